@@ -1,0 +1,99 @@
+"""The result of a solve: one equilibrium of the robot, immutable and complete."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.formulation import node_derivatives
+from solver.robot import Robot
+from solver.scene import Scene
+from solver.status import Status
+
+
+class Residuals(NamedTuple):
+    """Optimality of an equilibrium in the paper's node coordinates (eq. 5), each zero at an exact solution.
+
+    Attributes:
+        stationarity: Largest entry of the Lagrangian's gradient, equality multipliers by least squares [rad²/mm].
+        lengths: Largest violation of a backbone, cable or disk length [mm].
+        gaps: Deepest penetration, at least 0 [mm].
+        complementarity: Largest product of a multiplier and its gap [rad²].
+        sign: Most negative multiplier's size, at least 0 [rad²/mm].
+    """
+
+    stationarity: float
+    lengths: float
+    gaps: float
+    complementarity: float
+    sign: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equilibrium:
+    """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
+
+    Frame: base at the origin, unactuated backbone along +y, cable on the +x side. Obstacles are counted by m, nodes
+    0…n from the base, points are (backbone, cable). All arrays are read-only.
+
+    Attributes:
+        robot: The robot.
+        scene: The obstacles.
+        cable_mm: Cable displacement l, which differs from the command after a stall or jam [mm].
+        shear: Shear angle ψ of each segment, ``(n,)`` [rad].
+        nodes: Backbone point and disk angle, ``(n+1, 3)`` [mm, mm, rad].
+        cable_nodes: Cable point on each disk, ``(n+1, 2)`` [mm].
+        multipliers: Lagrange multipliers of the gaps, ``(m, 2, n+1)`` [rad²/mm].
+        gaps: Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, 2, n+1)`` [mm].
+        objective: Sum of squared disk angles [rad²].
+        tension: Cable tension dE/dl along the branch [N].
+        status: How the step that led here ended.
+        iterations: Newton iterations of that step.
+    """
+
+    robot: Robot
+    scene: Scene
+    cable_mm: float
+    shear: np.ndarray
+    nodes: np.ndarray
+    cable_nodes: np.ndarray
+    multipliers: np.ndarray
+    gaps: np.ndarray
+    objective: float
+    tension: float
+    status: Status
+    iterations: int
+
+    def __post_init__(self) -> None:
+        for array in (self.shear, self.nodes, self.cable_nodes, self.multipliers, self.gaps):
+            array.flags.writeable = False
+
+    @property
+    def contact(self) -> np.ndarray:
+        """Which points touch which obstacle: a positive multiplier, ``(m, 2, n+1)`` bool."""
+        return self.multipliers > 0
+
+    def residuals(self) -> Residuals:
+        """Recompute the optimality conditions of eq. 5 from the nodes and multipliers alone.
+
+        The derivatives are those of the node-coordinate problem in :mod:`solver.formulation`, which shares nothing
+        with the reduced coordinates that the solver works in.
+        """
+        parameters = [self.cable_mm, self.robot.length_mm, self.robot.offset_mm]
+        parameters += [value for obstacle in self.scene for value in obstacle.parameters]
+        unknowns = np.concatenate([self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel()])
+        slope, lengths, equality_slopes, gaps, gap_slopes = (
+            value.full() for value in node_derivatives(self.robot.segments, self.scene.kinds)(unknowns, parameters)
+        )
+        forces = self.multipliers[:, :, 1:].ravel()
+        touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
+        balance = slope.ravel() - (gap_slopes.T @ forces if forces.size else 0.0)
+        tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
+        clearance = gaps.ravel()[touchable]
+        return Residuals(
+            stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
+            lengths=float(np.abs(lengths).max()),
+            gaps=float(max(0.0, -clearance.min(initial=0.0))),
+            complementarity=float(np.abs(forces[touchable] * clearance).max(initial=0.0)),
+            sign=float(max(0.0, -forces.min(initial=0.0))),
+        )

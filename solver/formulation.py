@@ -1,0 +1,127 @@
+"""The mathematics of the planar model, written once, in CasADi.
+
+Three layers, all in millimetre and radian:
+
+- *segment law*: the angle between consecutive disks as a function of the shear angle, the reduced coordinate
+  that eliminates the length equalities of eq. 4;
+- *gap laws*: signed clearance of a point from an obstacle, scaled so that its gradient has unit length on the
+  surface and a multiplier has units rad²/mm;
+- *node-coordinate problem*: eq. 4/5 of the paper as they stand, for the reference solver and for the certificate.
+
+The first two are turned into C when the package is built (:mod:`solver.codegen`), with their derivatives.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+
+
+def segment_angle(shear: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
+    """Angle θ between consecutive disks of a segment whose cable is ``pull`` shorter than its backbone.
+
+    The chord ``w`` between the free ends of the disks is ``l0 cos ψ − sqrt(la² − l0² sin² ψ)`` with
+    ``la = l0 − pull``; it is written as a quotient so that no digits are lost for a small pull.
+    """
+    cable = length - pull
+    chord = pull * (length + cable) / (length * ca.cos(shear) + ca.sqrt(cable**2 - (length * ca.sin(shear)) ** 2))
+    return 2 * ca.asin(chord / (2 * offset))
+
+
+def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to a circle ``shape = (x, y, r)``: ``(|p − c|² − r²) / 2r``."""
+    return (ca.sumsqr(point - shape[:2]) - shape[2] ** 2) / (2 * shape[2])
+
+
+def half_plane_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to a half-plane ``shape = (nx, ny, offset)`` with unit outward normal: ``n·p − offset`` (eq. 12)."""
+    return ca.dot(point, shape[:2]) - shape[2]
+
+
+GAP_LAWS = {"circle": circle_gap, "half_plane": half_plane_gap}
+
+
+def segment_function() -> ca.Function:
+    """``(ψ, pull, l0, a) → θ, θ_ψ, θ_ψψ, θ_pull``."""
+    shear, pull, length, offset = (ca.SX.sym(name) for name in ("shear", "pull", "length", "offset"))
+    angle = segment_angle(shear, pull, length, offset)
+    slope = ca.gradient(angle, shear)
+    outputs = [ca.vertcat(angle, slope, ca.gradient(slope, shear), ca.gradient(angle, pull))]
+    return ca.Function("ccr_segment", [shear, pull, length, offset], outputs)
+
+
+def gap_function(kind: str) -> ca.Function:
+    """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle."""
+    point, shape = ca.SX.sym("point", 2), ca.SX.sym("shape", 3)
+    gap = GAP_LAWS[kind](point, shape)
+    hessian, gradient = ca.hessian(gap, point)
+    outputs = ca.vertcat(gap, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1])
+    return ca.Function(f"ccr_{kind}_gap", [point, shape], [ca.densify(outputs)])
+
+
+class NodeProblem(NamedTuple):
+    """Eq. 5 in node coordinates, symbolic.
+
+    Attributes:
+        unknowns: Backbone then cable points of nodes 1…n, each as x, y pairs, ``(4n,)`` [mm].
+        parameters: ``(l, L0, a)`` then the shapes of the obstacles, ``(3 + 3m,)``.
+        objective: Sum of squared disk angles [rad²].
+        equalities: Backbone, cable and disk lengths of the segments minus their values, ``(3n,)`` [mm].
+        gaps: Gap of every point of nodes 1…n to every obstacle, ordered (obstacle, point, node), ``(2nm,)`` [mm].
+    """
+
+    unknowns: ca.MX
+    parameters: ca.MX
+    objective: ca.MX
+    equalities: ca.MX
+    gaps: ca.MX
+
+
+def node_problem(segments: int, kinds: tuple[str, ...]) -> NodeProblem:
+    """Build eq. 5 (eq. 4 when ``kinds`` is empty) for ``segments`` segments and the given kinds of obstacle.
+
+    The arccosine of eq. 4 is written as an arctangent of the same disk directions, which is smooth at zero.
+    """
+    unknowns = ca.MX.sym("unknowns", 4 * segments)
+    parameters = ca.MX.sym("parameters", 3 + 3 * len(kinds))
+    pull, total, offset = parameters[0], parameters[1], parameters[2]
+    backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(unknowns[: 2 * segments], 2, segments))
+    cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments :], 2, segments))
+    disk = cable - backbone
+    before, after = disk[:, :-1], disk[:, 1:]
+    turned = before[0, :] * after[1, :] - before[1, :] * after[0, :]
+    angle = ca.atan2(turned, ca.sum1(before * after))
+    equalities = ca.horzcat(
+        _norms(backbone[:, 1:] - backbone[:, :-1]) - total / segments,
+        _norms(cable[:, 1:] - cable[:, :-1]) - (total - pull) / segments,
+        _norms(after) - offset,
+    )
+    gaps = [
+        _gaps(kind, points[:, 1:], parameters[3 + 3 * j : 6 + 3 * j])
+        for j, kind in enumerate(kinds)
+        for points in (backbone, cable)
+    ]
+    return NodeProblem(unknowns, parameters, ca.sumsqr(angle), equalities.T, ca.vertcat(*gaps) if gaps else ca.MX(0, 1))
+
+
+def _norms(columns: ca.MX) -> ca.MX:
+    return ca.sqrt(ca.sum1(columns**2))
+
+
+def _gaps(kind: str, points: ca.MX, shape: ca.MX) -> ca.MX:
+    count = points.shape[1]
+    return gap_function(kind).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
+
+
+@lru_cache(maxsize=32)
+def node_derivatives(segments: int, kinds: tuple[str, ...]) -> ca.Function:
+    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, gaps, their Jacobian`` of :func:`node_problem`."""
+    problem = node_problem(segments, kinds)
+    outputs = [
+        ca.gradient(problem.objective, problem.unknowns),
+        problem.equalities,
+        ca.jacobian(problem.equalities, problem.unknowns),
+        problem.gaps,
+        ca.jacobian(problem.gaps, problem.unknowns),
+    ]
+    return ca.Function("node_derivatives", [problem.unknowns, problem.parameters], outputs)

@@ -1,0 +1,106 @@
+// The planar robot among obstacles at one trial shape: kinematics, objective, gaps and their derivatives.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "limits.hpp"
+#include "linalg.hpp"
+#include "riccati.hpp"
+
+namespace ccr {
+
+struct Robot {
+  int segments;
+  double length;       // of one segment [mm]
+  double offset;       // cable from backbone [mm]
+  double stiffness;    // EI / 2 l0 [N mm]
+  double max_tension;  // [N]
+};
+
+enum class Shape { kCircle, kHalfPlane };
+enum Point { kBackbone, kCable, kPoints };
+
+struct Obstacle {
+  Shape shape;
+  std::array<double, 3> parameters;      // circle: x, y, r; half-plane: outward normal, offset
+  std::vector<unsigned char> touchable;  // (n+1): whether a node can touch it
+};
+
+using State = Vec<3>;    // x, y, disk angle
+using Control = Vec<1>;  // shear
+using Position = Vec<2>;
+using System = Riccati<3, 1>;
+
+struct Gap {
+  double value;
+  State slope;  // with respect to the state of its node
+};
+
+// Contacts that carry a multiplier. A contact is (obstacle * kPoints + point) * (n+1) + node.
+struct ActiveSet {
+  int count = 0;
+  std::array<int, limits::kMaxActive> contact;
+  std::array<double, limits::kMaxActive> multiplier;
+
+  void drop(int j) {
+    --count;
+    for (int k = j; k < count; ++k) {
+      contact[k] = contact[k + 1];
+      multiplier[k] = multiplier[k + 1];
+    }
+  }
+};
+
+class Chain {
+ public:
+  Chain(const Robot& robot, const std::vector<Obstacle>& obstacles);
+
+  // Shape at a cable displacement; false when a shear leaves the range of the segment law.
+  bool evaluate(const std::vector<Control>& shear, double cable);
+
+  // Slope of the Lagrangian J - Σ λ c with respect to the shear, with the adjoints it is made of.
+  void reduced_gradient(const ActiveSet& active);
+  // Exact Hessian of the Lagrangian, and its slope in the cable displacement; both follow reduced_gradient.
+  void curvature(const ActiveSet& active, System& system) const;
+  double cable_slope() const;
+
+  const Robot& robot() const { return robot_; }
+  const std::vector<Obstacle>& obstacles() const { return obstacles_; }
+  int contacts() const { return static_cast<int>(gaps_.size()); }
+  int node(int contact) const { return contact % (robot_.segments + 1); }
+  const Obstacle& obstacle(int contact) const { return obstacles_[contact / (kPoints * (robot_.segments + 1))]; }
+  bool touchable(int contact) const { return obstacle(contact).touchable[node(contact)]; }
+
+  double objective() const { return objective_; }
+  double violation() const;  // largest -gap, at least 0
+  double steepest() const { return steepest_; }  // largest slope of the objective alone
+  double free_angle() const { return pull_ / robot_.offset; }
+  const std::vector<State>& states() const { return states_; }
+  const std::vector<Position>& points() const { return points_; }  // (point, node)
+  const std::vector<Gap>& gaps() const { return gaps_; }
+  const std::vector<Control>& gradient() const { return gradient_; }
+
+ private:
+  struct Bend {
+    double angle, slope, curvature, pull_slope;  // θ, θ_ψ, θ_ψψ, θ_pull
+    double dx, dy;                               // backbone segment
+  };
+
+  int point(int contact) const { return contact / (robot_.segments + 1) % kPoints; }
+  void measure_gaps();
+
+  Robot robot_;
+  std::vector<Obstacle> obstacles_;
+  double pull_ = 0, objective_ = 0, steepest_ = 0;
+  std::vector<Bend> bends_;
+  std::vector<State> states_;
+  std::vector<Position> levers_;  // cable point from its backbone point
+  std::vector<Position> points_;
+  std::vector<Gap> gaps_;
+  std::vector<State> pulls_;     // Σ λ ∇c at each node
+  std::vector<State> adjoints_;  // of the state each segment leads to
+  std::vector<Control> gradient_;
+};
+
+}  // namespace ccr

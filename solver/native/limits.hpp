@@ -1,0 +1,53 @@
+// Every tolerance and limit of the solver, named once. Lengths in mm, angles in rad.
+#pragma once
+
+namespace ccr::limits {
+
+// A point is an equilibrium when its stationarity residual is below
+// kStationarity * (free segment angle)^2 + kRoundoff * (largest objective slope) and no gap is violated.
+inline constexpr double kStationarity = 1e-9;
+inline constexpr double kRoundoff = 1e-13;
+inline constexpr double kFeasibility = 1e-10;
+
+// Newton.
+inline constexpr int kNewtonIterations = 14;
+inline constexpr double kNewtonCap = 0.3;      // largest shear change of one iteration
+inline constexpr double kArmijo = 1e-4;
+inline constexpr int kBacktracks = 6;
+
+// Active set.
+inline constexpr int kMaxActive = 32;
+inline constexpr int kActiveSetChanges = 96;
+inline constexpr double kDependent = 1e-12;    // relative curvature below which a gap depends on the active ones
+
+// Convexification: penalty on active gaps first, then damping of the shear, relative to the curvature at hand.
+inline constexpr double kPenalty = 100.0;
+inline constexpr double kPenaltyGrowth = 100.0;
+inline constexpr int kPenaltyTries = 2;
+inline constexpr double kDamping = 1e-3;
+inline constexpr double kDampingGrowth = 4.0;
+inline constexpr int kDampingTries = 40;
+
+// Continuation.
+inline constexpr double kPretension = 0.05;    // cable displacement below which a touching robot is not slackened
+inline constexpr double kLargestStep = 0.5;    // cable displacement of one sub-step
+inline constexpr double kSmallestStep = 1e-4;
+inline constexpr double kMoveOffset = 0.5;     // a node moves at most kMoveOffset + kMoveSlope * |step| in a sub-step
+inline constexpr double kMoveSlope = 16.0;
+inline constexpr double kSweepDepth = 0.125;   // fraction of the radius a point's path may cut into a circle
+inline constexpr int kSubSteps = 400;
+inline constexpr int kBranchEnds = 24;         // ends met in one step before the robot counts as jammed
+
+// Stall: the cable stops where the tension is within this fraction below its limit.
+inline constexpr double kTensionBand = 1e-7;
+inline constexpr int kStallIterations = 40;
+
+// Feasible descent after a branch end.
+inline constexpr int kDescentIterations = 300;
+inline constexpr double kDescentCap = 0.03;    // largest shear change of one iterate
+inline constexpr double kDescentFeasibility = 1e-9;
+inline constexpr int kDescentBacktracks = 12;
+inline constexpr int kRestorations = 8;
+inline constexpr double kDescentMove = 4.0;    // largest node motion of one iterate
+
+}  // namespace ccr::limits

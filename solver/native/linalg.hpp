@@ -1,0 +1,84 @@
+// Fixed-size dense blocks, small enough to be unrolled by the compiler.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+namespace ccr {
+
+template <int R, int C>
+struct Mat {
+  std::array<double, R * C> v{};
+  double& operator()(int r, int c) { return v[r * C + c]; }
+  double operator()(int r, int c) const { return v[r * C + c]; }
+  double& operator[](int i) { return v[i]; }
+  double operator[](int i) const { return v[i]; }
+  Mat& operator+=(const Mat& o) {
+    for (int i = 0; i < R * C; ++i) v[i] += o.v[i];
+    return *this;
+  }
+  Mat& operator-=(const Mat& o) {
+    for (int i = 0; i < R * C; ++i) v[i] -= o.v[i];
+    return *this;
+  }
+};
+
+template <int N>
+using Vec = Mat<N, 1>;
+
+template <int R, int K, int C>
+Mat<R, C> operator*(const Mat<R, K>& a, const Mat<K, C>& b) {
+  Mat<R, C> out;
+  for (int r = 0; r < R; ++r)
+    for (int k = 0; k < K; ++k)
+      for (int c = 0; c < C; ++c) out(r, c) += a(r, k) * b(k, c);
+  return out;
+}
+
+// aᵀ b
+template <int K, int R, int C>
+Mat<R, C> transpose_times(const Mat<K, R>& a, const Mat<K, C>& b) {
+  Mat<R, C> out;
+  for (int k = 0; k < K; ++k)
+    for (int r = 0; r < R; ++r)
+      for (int c = 0; c < C; ++c) out(r, c) += a(k, r) * b(k, c);
+  return out;
+}
+
+template <int N>
+double dot(const Vec<N>& a, const Vec<N>& b) {
+  double sum = 0;
+  for (int i = 0; i < N; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// In-place lower Cholesky factor; false when the matrix is not positive definite.
+template <int N>
+bool cholesky(Mat<N, N>& a) {
+  for (int j = 0; j < N; ++j) {
+    for (int k = 0; k < j; ++k) a(j, j) -= a(j, k) * a(j, k);
+    if (!(a(j, j) > 0)) return false;
+    a(j, j) = std::sqrt(a(j, j));
+    for (int i = j + 1; i < N; ++i) {
+      for (int k = 0; k < j; ++k) a(i, j) -= a(i, k) * a(j, k);
+      a(i, j) /= a(j, j);
+    }
+  }
+  return true;
+}
+
+template <int N, int C>
+void cholesky_solve(const Mat<N, N>& l, Mat<N, C>& b) {
+  for (int c = 0; c < C; ++c) {
+    for (int i = 0; i < N; ++i) {
+      for (int k = 0; k < i; ++k) b(i, c) -= l(i, k) * b(k, c);
+      b(i, c) /= l(i, i);
+    }
+    for (int i = N - 1; i >= 0; --i) {
+      for (int k = i + 1; k < N; ++k) b(i, c) -= l(k, i) * b(k, c);
+      b(i, c) /= l(i, i);
+    }
+  }
+}
+
+}  // namespace ccr

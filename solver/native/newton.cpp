@@ -1,0 +1,182 @@
+#include "newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ccr {
+
+using namespace limits;
+
+Newton::Newton(const Robot& robot, const std::vector<Obstacle>& obstacles)
+    : chain(robot, obstacles),
+      system_(robot.segments),
+      contacts_(robot.segments),
+      step_(robot.segments),
+      correction_(robot.segments),
+      penalty_(kMaxActive) {
+  trial_.shear.resize(robot.segments);
+}
+
+bool Newton::equilibrium() const {
+  double worst = 0;
+  for (const Control& g : chain.gradient()) worst = std::max(worst, std::abs(g[0]));
+  const double free = chain.free_angle();
+  return worst <= kStationarity * free * free + kRoundoff * chain.steepest() && feasible(kFeasibility);
+}
+
+// Exact curvature where it is positive; else a penalty on the active gaps, which leaves the solution where it is;
+// else damping, which only shortens the way there.
+bool Newton::convexify(const ActiveSet& active) {
+  damping_ = 0;
+  std::fill(penalty_.begin(), penalty_.end(), 0.0);
+  chain.curvature(active, system_);
+  if (system_.factor(0)) return true;
+
+  double scale = 0;
+  for (const System::Stage& stage : system_.stages) scale = std::max(scale, std::abs(stage.huu[0]));
+  double strength = kPenalty * scale;
+  for (int attempt = 0; active.count > 0 && attempt < kPenaltyTries; ++attempt, strength *= kPenaltyGrowth) {
+    for (int j = 0; j < active.count; ++j) {
+      const int node = chain.node(active.contact[j]);
+      const State& slope = chain.gaps()[active.contact[j]].slope;
+      const double reach = chain.robot().length * node;
+      const double target = strength / (reach * reach);
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) system_.node_hessian[node](r, c) += (target - penalty_[j]) * slope[r] * slope[c];
+      penalty_[j] = target;
+    }
+    if (system_.factor(0)) return true;
+  }
+  damping_ = kDamping * scale;
+  for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
+    if (system_.factor(damping_)) return true;
+  return false;
+}
+
+// The step to the solution of the quadratic model, and the multipliers there.
+bool Newton::model_step(ActiveSet& target) {
+  system_.descend(chain.gradient().data(), step_.shear.data(), step_.states.data());
+  return contacts_.solve(chain, system_, penalty_, target, step_);
+}
+
+double Newton::cap(double largest) const {
+  double longest = 0;
+  for (const Control& d : step_.shear) longest = std::max(longest, std::abs(d[0]));
+  return longest > largest ? largest / longest : 1.0;
+}
+
+double Newton::merit(double weight) const {
+  double violation = 0;
+  for (const Gap& gap : chain.gaps()) violation += std::max(0.0, -gap.value);
+  return chain.objective() + weight * violation;
+}
+
+namespace {
+
+void advance(const Iterate& from, double scale, const Direction& step, Iterate& to) {
+  for (std::size_t i = 0; i < from.shear.size(); ++i) to.shear[i][0] = from.shear[i][0] + scale * step.shear[i][0];
+}
+
+// Multipliers a fraction of the way from one set to another.
+void blend(const ActiveSet& from, double scale, ActiveSet& to) {
+  if (scale == 1) return;
+  for (int j = 0; j < to.count; ++j) {
+    double before = 0;
+    for (int k = 0; k < from.count; ++k)
+      if (from.contact[k] == to.contact[j]) before = from.multiplier[k];
+    to.multiplier[j] = before + scale * (to.multiplier[j] - before);
+  }
+}
+
+}  // namespace
+
+Verdict Newton::solve(Iterate& at) {
+  Verdict verdict;
+  verdict.stable = true;
+  if (!chain.evaluate(at.shear, at.cable)) return verdict;
+  double weight = 0;
+  for (; verdict.iterations <= kNewtonIterations; ++verdict.iterations) {
+    chain.reduced_gradient(at.active);
+    if (equilibrium()) {
+      verdict.converged = true;
+      return verdict;
+    }
+    ActiveSet target = at.active;
+    if (!convexify(at.active) || !model_step(target)) return verdict;
+    verdict.stable = damping_ == 0;
+
+    double slope = 0;  // of the objective along the step
+    for (std::size_t i = 0; i < step_.shear.size(); ++i) slope += chain.gradient()[i][0] * step_.shear[i][0];
+    for (int j = 0; j < at.active.count; ++j)
+      slope += at.active.multiplier[j] *
+               dot(chain.gaps()[at.active.contact[j]].slope, step_.states[chain.node(at.active.contact[j])]);
+    for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
+    const double before = merit(weight);
+    const double expected = slope - (before - chain.objective());
+
+    double scale = cap(kNewtonCap);
+    int backtracks = 0;
+    for (;; scale /= 2, ++backtracks) {
+      if (backtracks > kBacktracks) return verdict;
+      advance(at, scale, step_, trial_);
+      if (!chain.evaluate(trial_.shear, at.cable)) continue;
+      // Close to the solution curvature of the gaps makes the merit reject good steps: trust Newton there.
+      if (scale == 1 && cap(kDescentCap) == 1) break;
+      if (merit(weight) <= before + kArmijo * scale * std::min(expected, 0.0)) break;
+    }
+    std::swap(at.shear, trial_.shear);
+    blend(at.active, scale, target);
+    at.active = target;
+  }
+  return verdict;
+}
+
+bool Newton::measure(const Iterate& at) {
+  if (!chain.evaluate(at.shear, at.cable)) return false;
+  chain.reduced_gradient(at.active);
+  return convexify(at.active);
+}
+
+bool Newton::restore(Iterate& at) {
+  if (!chain.evaluate(at.shear, at.cable)) return false;
+  for (int attempt = 0; attempt < kRestorations; ++attempt) {
+    if (feasible(kDescentFeasibility)) return true;
+    std::fill(penalty_.begin(), penalty_.end(), 0.0);
+    std::fill(correction_.shear.begin(), correction_.shear.end(), Control{});
+    std::fill(correction_.states.begin(), correction_.states.end(), State{});
+    ActiveSet pushed;
+    if (!contacts_.solve(chain, system_, penalty_, pushed, correction_)) return false;
+    for (const Control& d : correction_.shear)
+      if (!(std::abs(d[0]) <= kDescentCap)) return false;
+    advance(at, 1, correction_, at);
+    if (!chain.evaluate(at.shear, at.cable)) return false;
+  }
+  return feasible(kDescentFeasibility);
+}
+
+Verdict Newton::descend(Iterate& at, bool& moved) {
+  Verdict verdict;
+  moved = false;
+  if (!measure(at)) return verdict;
+  verdict.stable = damping_ == 0;
+  verdict.converged = equilibrium();
+  if (verdict.converged) return verdict;
+  ActiveSet target = at.active;
+  if (!model_step(target)) return verdict;
+  const double before = chain.objective();
+  double scale = cap(kDescentCap);
+  trial_.cable = at.cable;
+  for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= 2) {
+    advance(at, scale, step_, trial_);
+    if (!restore(trial_)) continue;
+    if (chain.objective() > before * (1 + 1e-13)) continue;
+    std::swap(at.shear, trial_.shear);
+    blend(at.active, scale, target);
+    at.active = target;
+    moved = true;
+    return verdict;
+  }
+  return verdict;
+}
+
+}  // namespace ccr

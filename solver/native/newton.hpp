@@ -1,0 +1,57 @@
+// Newton's method for one equilibrium at a fixed cable displacement, near it and far from it.
+#pragma once
+
+#include <vector>
+
+#include "chain.hpp"
+#include "contacts.hpp"
+
+namespace ccr {
+
+struct Iterate {
+  double cable = 0;
+  std::vector<Control> shear;
+  ActiveSet active;
+};
+
+struct Verdict {
+  bool converged = false;
+  bool stable = false;  // the reduced Hessian was positive definite on the active gaps
+  int iterations = 0;
+};
+
+class Newton {
+ public:
+  Newton(const Robot& robot, const std::vector<Obstacle>& obstacles);
+
+  // Full-space iteration with an l1 merit search: quadratic, for a start close to an equilibrium.
+  Verdict solve(Iterate& at);
+
+  // One feasible iterate of energy descent. `from` must be feasible. Returns the verdict on `from`, and where it is not
+  // yet an equilibrium moves `at` to a feasible shape of lower energy; `moved` tells whether it could.
+  Verdict descend(Iterate& at, bool& moved);
+
+  // Takes the curvature at `at` as the measure of motion for restore; false when it cannot be made positive.
+  bool measure(const Iterate& at);
+  // Smallest motion that meets every gap again; false when there is none nearby.
+  bool restore(Iterate& at);
+
+  Chain chain;  // evaluated at the last iterate
+
+ private:
+  bool equilibrium() const;
+  bool feasible(double tolerance) const { return chain.violation() <= tolerance; }
+  bool convexify(const ActiveSet& active);
+  bool model_step(ActiveSet& target);
+  double cap(double largest) const;
+  double merit(double weight) const;
+
+  System system_;
+  Contacts contacts_;
+  Direction step_, correction_;
+  Iterate trial_;
+  std::vector<double> penalty_;
+  double damping_ = 0;
+};
+
+}  // namespace ccr

@@ -1,0 +1,133 @@
+"""The solver: one robot in one scene, its equilibria followed step by step."""
+
+import math
+
+import numpy as np
+
+from solver._kernel import Kernel
+from solver.equilibrium import Equilibrium
+from solver.obstacles import Obstacle
+from solver.robot import Robot
+from solver.scene import Scene
+from solver.status import Status
+
+SHAPES = {"circle": 0, "half_plane": 1}  # order of ccr::Shape in native/chain.hpp
+
+
+class Solver:
+    """Follows the equilibria of a robot among obstacles as its cable is pulled and released (eq. 5).
+
+    The equilibrium reached depends on the way there, so the present one is an argument of every step and the solver
+    keeps none.
+
+    Args:
+        robot: The robot.
+        scene: The obstacles.
+
+    Raises:
+        ValueError: If an obstacle overlaps the straight robot or names a node the robot does not have.
+    """
+
+    def __init__(self, robot: Robot, scene: Scene) -> None:
+        self.robot = robot
+        self.scene = scene
+        nodes = robot.segments + 1
+        touchable = np.array([obstacle.touchable(nodes) for obstacle in scene], dtype=bool).reshape(len(scene), nodes)
+        self._kernel = Kernel(
+            robot.segments,
+            robot.segment_mm,
+            robot.offset_mm,
+            robot.stiffness,
+            robot.max_tension,
+            [SHAPES[kind] for kind in scene.kinds],
+            np.array([obstacle.parameters for obstacle in scene], dtype=float).reshape(len(scene), 3),
+            touchable,
+        )
+        self._contacts = (len(scene), 2, nodes)
+        self._rest = self._follow(0.0, np.zeros(robot.segments), np.zeros(self._contacts), 0.0)
+        check_clear(self._rest)
+
+    def rest(self) -> Equilibrium:
+        """The straight, unactuated robot."""
+        return self._rest
+
+    def step(self, equilibrium: Equilibrium, cable_mm: float) -> Equilibrium:
+        """Move the cable to a displacement, as far as tension and obstacles allow.
+
+        Args:
+            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
+            cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
+
+        Returns:
+            The equilibrium reached; its ``status`` says how. While anything touches, the cable is not slackened below
+            a pretension of 0.05 mm, where the shape would be undetermined.
+
+        Raises:
+            ValueError: If the command is out of range or the equilibrium is another robot's or scene's.
+        """
+        check_command(self.robot, self.scene, equilibrium, cable_mm)
+        return self._follow(equilibrium.cable_mm, equilibrium.shear, equilibrium.multipliers, cable_mm)
+
+    def trace(self, equilibrium: Equilibrium, cable_mm: float) -> np.ndarray:
+        """Every shape accepted on the way of :meth:`step`, from the present one on, ``(k, n+1, 3)`` [mm, mm, rad].
+
+        Shows what happens inside a step: its sub-steps, and the descent through a snap.
+
+        Raises:
+            ValueError: As :meth:`step`.
+        """
+        check_command(self.robot, self.scene, equilibrium, cable_mm)
+        shapes = self._kernel.trace(equilibrium.cable_mm, equilibrium.shear, equilibrium.multipliers, cable_mm)
+        return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
+
+    def _follow(self, cable: float, shear: np.ndarray, multipliers: np.ndarray, target: float) -> Equilibrium:
+        nodes = self.robot.segments + 1
+        shear_out, nodes_out, cable_nodes = np.empty(nodes - 1), np.empty((nodes, 3)), np.empty((nodes, 2))
+        multipliers_out, gaps = np.empty(self._contacts), np.empty(self._contacts)
+        status, iterations, reached, tension, objective = self._kernel.step(
+            cable, shear, multipliers, target, shear_out, multipliers_out, nodes_out, cable_nodes, gaps
+        )
+        return Equilibrium(
+            self.robot,
+            self.scene,
+            reached,
+            shear_out,
+            nodes_out,
+            cable_nodes,
+            multipliers_out,
+            gaps,
+            objective,
+            tension,
+            Status(status),
+            iterations,
+        )
+
+
+def check_clear(rest: Equilibrium) -> None:
+    """Refuse obstacles that overlap the straight robot.
+
+    Raises:
+        ValueError: Naming the obstacle, the node and the depth.
+    """
+    for obstacle, gaps in zip(rest.scene, rest.gaps, strict=True):
+        if gaps.min() < 0:
+            node = int(np.unravel_index(gaps.argmin(), gaps.shape)[1])
+            raise ValueError(f"{_name(obstacle)} overlaps the straight robot by {-gaps.min():.3g} mm at node {node}")
+
+
+def check_command(robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float) -> None:
+    """Refuse a command out of range and an equilibrium of another robot or scene.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    if not (math.isfinite(cable_mm) and 0 <= cable_mm <= robot.cable_limit_mm):
+        raise ValueError(f"cable_mm is {cable_mm}; it must be from 0 to {robot.cable_limit_mm:.6g} (robot.max_cable_mm)")
+    if equilibrium.robot is not robot and equilibrium.robot != robot:
+        raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
+    if equilibrium.scene is not scene and equilibrium.scene != scene:
+        raise ValueError("the equilibrium is of another scene; step from rest() of this solver")
+
+
+def _name(obstacle: Obstacle) -> str:
+    return f"{type(obstacle).__name__}{obstacle.parameters}"

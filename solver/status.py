@@ -1,0 +1,18 @@
+"""Verdicts of the solver, as data."""
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """How a step of the solver ended. Every verdict but ``FAILED`` comes with a valid equilibrium."""
+
+    CONVERGED = 0
+    """The commanded cable displacement was reached along the branch."""
+    SNAPPED = 1
+    """The equilibrium turned unstable on the way; the robot moved to the one it reaches physically."""
+    STALLED = 2
+    """The cable tension reached the robot's limit; the cable moved as far as that."""
+    JAMMED = 3
+    """Geometry blocks the robot; the largest feasible part of the increment was applied."""
+    FAILED = 4
+    """No equilibrium was found; the previous one is returned."""
