@@ -39,34 +39,66 @@ class Equilibrium:
     Attributes:
         robot: The robot.
         scene: The obstacles.
-        cable_mm: Cable displacement l, which differs from the command after a stall or jam [mm].
-        shear: Shear angle ψ of each segment, ``(n,)`` [rad].
-        nodes: Backbone point and disk angle, ``(n+1, 3)`` [mm, mm, rad].
-        cable_nodes: Cable point on each disk, ``(n+1, 2)`` [mm].
-        multipliers: Lagrange multipliers of the gaps, ``(m, 2, n+1)`` [rad²/mm].
-        gaps: Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, 2, n+1)`` [mm].
-        objective: Sum of squared disk angles [rad²].
-        tension: Cable tension dE/dl along the branch [N].
+        block: Everything below as one array, as the kernel reads and writes it.
         status: How the step that led here ended.
         iterations: Newton iterations of that step.
     """
 
     robot: Robot
     scene: Scene
-    cable_mm: float
-    shear: np.ndarray
-    nodes: np.ndarray
-    cable_nodes: np.ndarray
-    multipliers: np.ndarray
-    gaps: np.ndarray
-    objective: float
-    tension: float
+    block: np.ndarray
     status: Status
     iterations: int
 
     def __post_init__(self) -> None:
-        for array in (self.shear, self.nodes, self.cable_nodes, self.multipliers, self.gaps):
-            array.flags.writeable = False
+        self.block.flags.writeable = False
+
+    @property
+    def cable_mm(self) -> float:
+        """Cable displacement l, which differs from the command after a stall or jam [mm]."""
+        return float(self.block[0])
+
+    @property
+    def tension(self) -> float:
+        """Cable tension dE/dl along the branch [N]."""
+        return float(self.block[1])
+
+    @property
+    def objective(self) -> float:
+        """Sum of squared disk angles J = Σθ² [rad²]."""
+        return float(self.block[2])
+
+    @property
+    def shear(self) -> np.ndarray:
+        """Shear angle ψ of each segment, ``(n,)`` [rad]."""
+        return self.block[3 : 3 + self.robot.segments]
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Backbone point and disk angle of each node, ``(n+1, 3)`` [mm, mm, rad]."""
+        n = self.robot.segments
+        return self.block[3 + n : 6 + 4 * n].reshape(n + 1, 3)
+
+    @property
+    def cable_nodes(self) -> np.ndarray:
+        """Cable point on each disk, ``(n+1, 2)`` [mm]."""
+        n = self.robot.segments
+        return self.block[6 + 4 * n : 8 + 6 * n].reshape(n + 1, 2)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Lagrange multipliers of the gaps, ``(m, 2, n+1)`` [rad²/mm]."""
+        return self._contacts(0)
+
+    @property
+    def gaps(self) -> np.ndarray:
+        """Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, 2, n+1)`` [mm]."""
+        return self._contacts(1)
+
+    def _contacts(self, which: int) -> np.ndarray:
+        n, m = self.robot.segments, len(self.scene)
+        start = 8 + 6 * n + which * 2 * m * (n + 1)
+        return self.block[start : start + 2 * m * (n + 1)].reshape(m, 2, n + 1)
 
     @property
     def contact(self) -> np.ndarray:

@@ -17,15 +17,21 @@ from typing import NamedTuple
 import casadi as ca
 
 
-def segment_angle(shear: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
-    """Angle θ between consecutive disks of a segment whose cable is ``pull`` shorter than its backbone.
+def segment_half_sine(shear: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
+    """``u = sin θ/2`` of a segment whose cable is ``pull`` shorter than its backbone; θ is the angle between its disks.
 
-    The chord ``w`` between the free ends of the disks is ``l0 cos ψ − sqrt(la² − l0² sin² ψ)`` with
+    The chord ``2a·u`` between the free ends of the disks is ``l0 cos ψ − sqrt(la² − l0² sin² ψ)`` with
     ``la = l0 − pull``; it is written as a quotient so that no digits are lost for a small pull.
     """
     cable = length - pull
-    chord = pull * (length + cable) / (length * ca.cos(shear) + ca.sqrt(cable**2 - (length * ca.sin(shear)) ** 2))
-    return 2 * ca.asin(chord / (2 * offset))
+    reach = length * ca.cos(shear) + ca.sqrt(cable**2 - (length * ca.sin(shear)) ** 2)
+    return pull * (length + cable) / (reach * 2 * offset)
+
+
+def segment_closure(half_sine: ca.SX, shear: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
+    """Cable length of a segment squared, minus its value: zero at :func:`segment_half_sine` [mm²]."""
+    chord = 2 * offset * half_sine
+    return chord * (chord - 2 * length * ca.cos(shear)) + pull * (2 * length - pull)
 
 
 def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -42,12 +48,33 @@ GAP_LAWS = {"circle": circle_gap, "half_plane": half_plane_gap}
 
 
 def segment_function() -> ca.Function:
-    """``(ψ, pull, l0, a) → θ, θ_ψ, θ_ψψ, θ_pull``."""
-    shear, pull, length, offset = (ca.SX.sym(name) for name in ("shear", "pull", "length", "offset"))
-    angle = segment_angle(shear, pull, length, offset)
-    slope = ca.gradient(angle, shear)
-    outputs = [ca.vertcat(angle, slope, ca.gradient(slope, shear), ca.gradient(angle, pull))]
-    return ca.Function("ccr_segment", [shear, pull, length, offset], outputs)
+    """``(ψ, pull, l0, a) → θ, θ_ψ, θ_ψψ, θ_pull, cos(ψ − θ/2), sin(ψ − θ/2), cos θ, sin θ``.
+
+    ``ψ − θ/2`` is the direction of the backbone segment in the frame of its lower disk, from that frame's y axis. The
+    derivatives follow from the closure by the implicit function theorem, which costs one division in all.
+    """
+    shear, pull, length, offset, u = (ca.SX.sym(name) for name in ("shear", "pull", "length", "offset", "half_sine"))
+    closure = segment_closure(u, shear, pull, length, offset)
+    in_u, in_shear, in_pull = (ca.gradient(closure, variable) for variable in (u, shear, pull))
+    per_closure = -1 / in_u
+    u_shear = in_shear * per_closure
+    u_pull = in_pull * per_closure
+    bent = ca.gradient(in_shear, shear) + 2 * ca.gradient(in_shear, u) * u_shear + ca.gradient(in_u, u) * u_shear**2
+    half_cosine = ca.sqrt(1 - u**2)
+    per_cosine = 1 / half_cosine
+    sine, cosine = ca.sin(shear), ca.cos(shear)
+    law = ca.vertcat(
+        2 * ca.asin(u),
+        2 * per_cosine * u_shear,
+        2 * per_cosine * (bent * per_closure + u * (per_cosine * u_shear) ** 2),
+        2 * per_cosine * u_pull,
+        cosine * half_cosine + sine * u,
+        sine * half_cosine - cosine * u,
+        1 - 2 * u**2,
+        2 * u * half_cosine,
+    )
+    law = ca.cse(ca.substitute(law, u, segment_half_sine(shear, pull, length, offset)))
+    return ca.Function("ccr_segment", [shear, pull, length, offset], [law])
 
 
 def gap_function(kind: str) -> ca.Function:

@@ -43,8 +43,7 @@ class Solver:
             np.array([obstacle.parameters for obstacle in scene], dtype=float).reshape(len(scene), 3),
             touchable,
         )
-        self._contacts = (len(scene), 2, nodes)
-        self._rest = self._follow(0.0, np.zeros(robot.segments), np.zeros(self._contacts), 0.0)
+        self._rest = self._follow(np.zeros(self._kernel.block_size), 0.0)
         check_clear(self._rest)
 
     def rest(self) -> Equilibrium:
@@ -66,7 +65,7 @@ class Solver:
             ValueError: If the command is out of range or the equilibrium is another robot's or scene's.
         """
         check_command(self.robot, self.scene, equilibrium, cable_mm)
-        return self._follow(equilibrium.cable_mm, equilibrium.shear, equilibrium.multipliers, cable_mm)
+        return self._follow(equilibrium.block, cable_mm)
 
     def trace(self, equilibrium: Equilibrium, cable_mm: float) -> np.ndarray:
         """Every shape accepted on the way of :meth:`step`, from the present one on, ``(k, n+1, 3)`` [mm, mm, rad].
@@ -77,30 +76,13 @@ class Solver:
             ValueError: As :meth:`step`.
         """
         check_command(self.robot, self.scene, equilibrium, cable_mm)
-        shapes = self._kernel.trace(equilibrium.cable_mm, equilibrium.shear, equilibrium.multipliers, cable_mm)
+        shapes = self._kernel.trace(equilibrium.block, cable_mm)
         return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
 
-    def _follow(self, cable: float, shear: np.ndarray, multipliers: np.ndarray, target: float) -> Equilibrium:
-        nodes = self.robot.segments + 1
-        shear_out, nodes_out, cable_nodes = np.empty(nodes - 1), np.empty((nodes, 3)), np.empty((nodes, 2))
-        multipliers_out, gaps = np.empty(self._contacts), np.empty(self._contacts)
-        status, iterations, reached, tension, objective = self._kernel.step(
-            cable, shear, multipliers, target, shear_out, multipliers_out, nodes_out, cable_nodes, gaps
-        )
-        return Equilibrium(
-            self.robot,
-            self.scene,
-            reached,
-            shear_out,
-            nodes_out,
-            cable_nodes,
-            multipliers_out,
-            gaps,
-            objective,
-            tension,
-            Status(status),
-            iterations,
-        )
+    def _follow(self, block: np.ndarray, cable_mm: float) -> Equilibrium:
+        reached = np.empty_like(block)
+        status, iterations = self._kernel.step(block, cable_mm, reached)
+        return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
 
 
 def check_clear(rest: Equilibrium) -> None:

@@ -7,13 +7,50 @@ namespace ccr {
 
 using namespace limits;
 
-Branch::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles) : newton_(robot, obstacles) {
-  present.shear.resize(robot.segments);
-  trial_ = present;
-  points_ = newton_.chain.points();
+Branch::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles)
+    : newton_(robot, obstacles), points_(newton_.chain.points().size()) {
+  present_.shear.resize(robot.segments);
+  trial_ = present_;
 }
 
-double Branch::measure_tension() { return newton_.chain.robot().stiffness * newton_.chain.cable_slope(); }
+std::size_t Branch::block_size() const {
+  const std::size_t n = present_.shear.size();
+  return 3 + n + 5 * (n + 1) + 2 * newton_.chain.contacts();
+}
+
+void Branch::load(const double* block) {
+  const std::size_t n = present_.shear.size();
+  present_.cable = block[0];
+  tension_ = block[1];
+  block += 3;
+  for (Control& shear : present_.shear) shear[0] = *block++;
+  for (std::size_t i = 0; i <= n; ++i, block += 3) points_[i] = {{block[0], block[1]}};
+  for (std::size_t i = 0; i <= n; ++i, block += 2) points_[n + 1 + i] = {{block[0], block[1]}};
+  present_.active.count = 0;
+  for (int c = 0; c < newton_.chain.contacts(); ++c)
+    if (block[c] > 0 && present_.active.count < kMaxActive) {
+      present_.active.contact[present_.active.count] = c;
+      present_.active.multiplier[present_.active.count++] = block[c];
+    }
+  settled_ = false;
+}
+
+void Branch::store(double* block) const {
+  const Chain& chain = newton_.chain;
+  const std::size_t n = present_.shear.size();
+  *block++ = present_.cable;
+  *block++ = tension_;
+  *block++ = chain.objective();
+  for (const Control& shear : present_.shear) *block++ = shear[0];
+  for (const State& state : chain.states()) block = std::copy(state.v.begin(), state.v.end(), block);
+  for (std::size_t i = 0; i <= n; ++i) block = std::copy_n(chain.points()[n + 1 + i].v.begin(), 2, block);
+  std::fill_n(block, chain.contacts(), 0.0);
+  for (int j = 0; j < present_.active.count; ++j) block[present_.active.contact[j]] = present_.active.multiplier[j];
+  block += chain.contacts();
+  std::copy(chain.gaps().begin(), chain.gaps().end(), block);
+}
+
+double Branch::measure_tension() const { return newton_.chain.robot().stiffness * newton_.chain.cable_slope(); }
 
 void Branch::remember() {
   points_ = newton_.chain.points();
@@ -21,17 +58,19 @@ void Branch::remember() {
   for (const State& s : newton_.chain.states()) trace->insert(trace->end(), s.v.begin(), s.v.end());
 }
 
-void Branch::accept(double new_tension) {
-  std::swap(present, trial_);
-  tension = new_tension;
+void Branch::accept() {
+  std::swap(present_, trial_);
+  tension_ = trial_tension_;
+  settled_ = true;
   remember();
 }
 
-// Leaves the chain evaluated at `present`.
 void Branch::settle() {
-  newton_.chain.evaluate(present.shear, present.cable);
-  newton_.chain.reduced_gradient(present.active);
-  tension = measure_tension();
+  if (settled_) return;
+  newton_.chain.evaluate(present_.shear, present_.cable);
+  newton_.chain.reduced_gradient(present_.active);
+  tension_ = measure_tension();
+  settled_ = true;
 }
 
 // Whether every point came here from the last accepted shape without cutting through a circle or jumping.
@@ -68,144 +107,134 @@ bool Branch::attempt_free(double cable) {
   return newton_.chain.evaluate(trial_.shear, cable) && newton_.chain.violation() == 0;
 }
 
+// Leaves in `trial_` the equilibrium at another cable displacement, if it continues the branch from `present_`.
 Branch::Move Branch::attempt(double cable) {
-  const double allowed = kMoveOffset + kMoveSlope * std::abs(cable - present.cable);
-  trial_ = present;
+  settled_ = false;
+  trial_ = present_;
   trial_.cable = cable;
   if (!attempt_free(cable)) {
     if (cable <= 0) return Move::kRejected;
-    trial_.shear = present.shear;
+    trial_.shear = present_.shear;
     const Verdict verdict = newton_.solve(trial_);
     iterations += verdict.iterations;
-    if (!verdict.converged || !verdict.stable) return Move::kRejected;
+    if (!verdict.converged) return Move::kRejected;
   }
+  if (!passable(kMoveOffset + kMoveSlope * std::abs(cable - present_.cable))) return Move::kRejected;
   newton_.chain.reduced_gradient(trial_.active);
-  if (!passable(allowed)) return Move::kRejected;
   trial_tension_ = measure_tension();
-  const bool pulling = cable > present.cable;
+  const bool pulling = cable > present_.cable;
   return pulling && trial_tension_ > newton_.chain.robot().max_tension ? Move::kOverTension : Move::kAccepted;
 }
 
-// `present` is below the tension limit, `trial_` above: close in on the limit from below (Illinois false position).
-bool Branch::stall() {
-  const double limit = newton_.chain.robot().max_tension;
-  double high = trial_.cable, excess = trial_tension_ - limit, shortage = tension - limit;
-  int side = 0;
-  for (int i = 0; i < kStallIterations && tension < limit * (1 - kTensionBand); ++i) {
-    // Aim a little below the limit, so that the result lands inside the band.
-    const double aim = limit * kTensionBand / 2;
-    const double width = high - present.cable;
-    if (!(width > 1e-12 * high)) break;
-    const double cable = high - width * (excess + aim) / (excess - shortage);
-    switch (attempt(std::clamp(cable, present.cable + 1e-3 * width, high - 1e-3 * width))) {
-      case Move::kRejected:
-        return false;
-      case Move::kAccepted:
-        accept(trial_tension_);
-        shortage = tension - limit;
-        if (side == -1) excess /= 2;
-        side = -1;
-        break;
-      case Move::kOverTension:
-        high = trial_.cable;
-        excess = trial_tension_ - limit;
-        if (side == 1) shortage /= 2;
-        side = 1;
+// `present_` is below the tension limit, `trial_` above: close in from below by false position (Illinois), aiming into
+// the middle of the accepted band. False when the branch cannot be followed that far.
+bool Branch::approach_limit() {
+  const double aim = newton_.chain.robot().max_tension * (1 - kTensionBand / 2);
+  double high = trial_.cable, excess = trial_tension_ - aim, shortage = tension_ - aim;
+  Move last = Move::kRejected;
+  for (int i = 0; i < kStallIterations && !at_limit(); ++i) {
+    const double width = high - present_.cable;
+    if (!(width > kCableResolution * high)) break;
+    const double cable = high - width * excess / (excess - shortage);
+    const Move move = attempt(std::clamp(cable, present_.cable + 1e-3 * width, high - 1e-3 * width));
+    if (move == Move::kRejected) return false;
+    if (move == Move::kAccepted) {
+      accept();
+      shortage = tension_ - aim;
+      if (move == last) excess /= 2;
+    } else {
+      high = trial_.cable;
+      excess = trial_tension_ - aim;
+      if (move == last) shortage /= 2;
     }
+    last = move;
   }
   return true;
 }
 
 // The branch ends within the smallest step: descend from its end, feasible and slowly, to where the robot goes.
-bool Branch::pass_end(double direction, bool& snapped) {
-  const Iterate start = present;
-  const double start_tension = tension;
+Branch::End Branch::pass_end(double increment) {
+  const Iterate start = present_;
   const std::vector<Position> start_points = points_;
   const std::size_t start_trace = trace ? trace->size() : 0;
-  const auto give_up = [&] {
-    present = start;
-    tension = start_tension;
+  settled_ = false;
+  const auto blocked = [&] {
+    present_ = start;
     points_ = start_points;
     if (trace) trace->resize(start_trace);
-    return false;
+    settled_ = false;
+    settle();
+    return End::kBlocked;
   };
 
-  trial_ = present;
-  trial_.cable += direction;
-  bool moved = false;
-  if (!newton_.measure(present) || !newton_.restore(trial_) || !passable(kDescentMove)) return give_up();
-  std::swap(present, trial_);
-  remember();
-  for (int i = 0; i < kDescentIterations; ++i) {
-    trial_ = present;
+  trial_ = present_;
+  trial_.cable += increment;
+  bool moved = newton_.measure(present_) && newton_.restore(trial_);
+  for (int i = 0; i < kDescentIterations && moved && passable(kDescentMove); ++i) {
+    std::swap(present_, trial_);
+    remember();
+    trial_ = present_;
     const Verdict verdict = newton_.descend(trial_, moved);
     ++iterations;
-    if (verdict.converged) {
-      settle();
-      if (!verdict.stable) return give_up();
-      if (direction > 0 && tension > newton_.chain.robot().max_tension) return give_up();
-      double farthest = 0;
-      for (std::size_t k = 0; k < points_.size(); ++k)
-        farthest = std::max(farthest, std::hypot(points_[k][0] - start_points[k][0], points_[k][1] - start_points[k][1]));
-      snapped |= farthest > kMoveOffset;
-      return true;
-    }
-    if (!moved || !passable(kDescentMove)) return give_up();
-    std::swap(present, trial_);
-    remember();
+    if (!verdict.converged) continue;
+    settle();
+    if (increment > 0 && tension_ > newton_.chain.robot().max_tension) break;
+    double farthest = 0;
+    for (std::size_t k = 0; k < points_.size(); ++k)
+      farthest = std::max(farthest, std::hypot(points_[k][0] - start_points[k][0], points_[k][1] - start_points[k][1]));
+    return farthest > kMoveOffset ? End::kSnapped : End::kPassed;
   }
-  return give_up();
+  return blocked();
 }
 
+bool Branch::at_limit() const { return tension_ >= newton_.chain.robot().max_tension * (1 - kTensionBand); }
+
 Status Branch::follow(double target) {
-  iterations = 0;
-  settle();
-  remember();
-  const double limit = newton_.chain.robot().max_tension;
-  bool snapped = false;
-  int ends = 0;
+  Status reached = Status::kConverged;
   double step = kLargestStep;
-  for (int sub = 0; sub < kSubSteps; ++sub) {
-    double goal = target;
-    if (present.active.count > 0 && target < kPretension) goal = std::min(present.cable, kPretension);
-    const double remaining = goal - present.cable;
-    if (remaining == 0) {
-      settle();
-      return snapped ? Status::kSnapped : Status::kConverged;
-    }
-    const bool pulling = remaining > 0;
-    if (pulling && tension >= limit * (1 - kTensionBand)) {
-      settle();
-      return Status::kStalled;
-    }
+  bool refined = false;  // the last attempt was rejected: do not grow again at once
+  for (int sub = 0, ends = 0; sub < kSubSteps && ends < kBranchEnds; ++sub) {
+    // A touching robot is not slackened below its pretension.
+    const double goal = present_.active.count > 0 ? std::max(target, std::min(present_.cable, kPretension)) : target;
+    const double remaining = goal - present_.cable;
+    if (remaining == 0) return reached;
+    if (remaining > 0 && at_limit()) return Status::kStalled;
     const double size = std::min(step, std::abs(remaining));
-    const double cable = size == std::abs(remaining) ? goal : present.cable + std::copysign(size, remaining);
-    switch (attempt(cable)) {
-      case Move::kAccepted:
-        accept(trial_tension_);
-        step = std::min(2 * size, kLargestStep);
-        continue;
-      case Move::kOverTension:
-        if (stall()) {
-          settle();
-          return Status::kStalled;
-        }
-        step = size / 2;
-        continue;
-      case Move::kRejected:
-        if (size > kSmallestStep) {
-          step = size / 2;
-          continue;
-        }
+    const double cable = size == std::abs(remaining) ? goal : present_.cable + std::copysign(size, remaining);
+    const Move move = attempt(cable);
+    if (move == Move::kAccepted) {
+      accept();
+      step = refined ? size : std::min(2 * size, kLargestStep);
+      refined = false;
+    } else if (move == Move::kOverTension) {
+      if (approach_limit()) return Status::kStalled;
+      step = size / 2;
+    } else if (size > kSmallestStep) {
+      step = size / 2;
+      refined = true;
+    } else {
+      const End end = pass_end(cable - present_.cable);
+      if (end == End::kBlocked) return Status::kJammed;
+      if (end == End::kSnapped) reached = Status::kSnapped;
+      step = 2 * kSmallestStep;
+      refined = false;
+      ++ends;
     }
-    if (++ends > kBranchEnds || !pass_end(cable - present.cable, snapped)) {
-      settle();
-      return Status::kJammed;
-    }
-    step = 4 * kSmallestStep;
   }
-  settle();
   return Status::kJammed;
+}
+
+Status Branch::follow(const double* from, double target, double* to) {
+  iterations = 0;
+  load(from);
+  if (trace) {
+    settle();
+    remember();
+  }
+  const Status status = follow(target);
+  settle();
+  store(to);
+  return status;
 }
 
 }  // namespace ccr

@@ -1,6 +1,8 @@
 // An equilibrium followed from cable displacement to cable displacement, as the robot would move.
 #pragma once
 
+#include <cstddef>
+
 #include <vector>
 
 #include "newton.hpp"
@@ -13,33 +15,39 @@ class Branch {
  public:
   Branch(const Robot& robot, const std::vector<Obstacle>& obstacles);
 
-  // Starts from `present`, which must be an equilibrium, and takes the cable towards `target`.
-  Status follow(double target);
+  // An equilibrium as one block of numbers, in this order: cable, tension, objective; shear (n); x, y, angle of each
+  // node; x, y of each cable point; multiplier of each contact; gap of each contact.
+  std::size_t block_size() const;
 
-  Iterate present;
-  double tension = 0;
-  int iterations = 0;                  // of Newton's method in the last follow
+  // Takes the cable from the equilibrium in one block towards `target` and writes the one reached to another.
+  Status follow(const double* from, double target, double* to);
+
+  int iterations = 0;                    // of Newton's method in the last follow
   std::vector<double>* trace = nullptr;  // when set, receives (x, y, angle) of every node at every accepted shape
 
-  const Chain& chain() const { return newton_.chain; }  // evaluated at `present` after follow
-
  private:
+  void load(const double* block);
+  void store(double* block) const;
+  Status follow(double target);
   enum class Move { kAccepted, kRejected, kOverTension };
+  enum class End { kPassed, kSnapped, kBlocked };
 
   Move attempt(double cable);
   bool attempt_free(double cable);
-  bool stall();
-  bool pass_end(double direction, bool& snapped);
+  bool approach_limit();
+  bool at_limit() const;
+  End pass_end(double increment);
   bool passable(double allowed) const;
-  double measure_tension();
-  void accept(double tension);
+  double measure_tension() const;
+  void accept();
   void remember();
   void settle();
 
   Newton newton_;
-  Iterate trial_;
-  double trial_tension_ = 0;
-  std::vector<Position> points_;  // of the last accepted shape
+  Iterate present_, trial_;
+  double tension_ = 0, trial_tension_ = 0;
+  std::vector<Position> points_;  // of `present_`
+  bool settled_ = false;          // whether the chain is evaluated at `present_`
 };
 
 }  // namespace ccr

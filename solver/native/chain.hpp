@@ -30,12 +30,31 @@ struct Obstacle {
 using State = Vec<3>;    // x, y, disk angle
 using Control = Vec<1>;  // shear
 using Position = Vec<2>;
-using System = Riccati<3, 1>;
 
-struct Gap {
-  double value;
-  State slope;  // with respect to the state of its node
+// Dynamics of a segment in its lower state: the identity, and the motion of the next node per turn of the disk.
+struct Turn {
+  double x, y;
 };
+
+inline State times(const Turn& a, State s) {
+  s[0] += a.x * s[2];
+  s[1] += a.y * s[2];
+  return s;
+}
+
+template <int R>
+Mat<R, 3> times(Mat<R, 3> m, const Turn& a) {
+  for (int r = 0; r < R; ++r) m(r, 2) += m(r, 0) * a.x + m(r, 1) * a.y;
+  return m;
+}
+
+template <int C>
+Mat<3, C> transpose_times(const Turn& a, Mat<3, C> m) {
+  for (int c = 0; c < C; ++c) m(2, c) += a.x * m(0, c) + a.y * m(1, c);
+  return m;
+}
+
+using System = Riccati<3, 1, Turn>;
 
 // Contacts that carry a multiplier. A contact is (obstacle * kPoints + point) * (n+1) + node.
 struct ActiveSet {
@@ -78,16 +97,23 @@ class Chain {
   double free_angle() const { return pull_ / robot_.offset; }
   const std::vector<State>& states() const { return states_; }
   const std::vector<Position>& points() const { return points_; }  // (point, node)
-  const std::vector<Gap>& gaps() const { return gaps_; }
+  const std::vector<double>& gaps() const { return gaps_; }
+  State slope(int contact) const;  // of a gap with respect to the state of its node
   const std::vector<Control>& gradient() const { return gradient_; }
 
  private:
+  // Output of the generated segment law, and the backbone segment in the base frame.
   struct Bend {
     double angle, slope, curvature, pull_slope;  // θ, θ_ψ, θ_ψψ, θ_pull
-    double dx, dy;                               // backbone segment
+    double forward, sideways;                    // cos and sin of the segment's direction from the lower disk's y axis
+    double cosine, sine;                         // of θ
+    double dx, dy;
   };
 
-  int point(int contact) const { return contact / (robot_.segments + 1) % kPoints; }
+  const Position& point(int contact) const { return points_[contact % points_.size()]; }
+  Position lever(int contact) const {
+    return contact / (robot_.segments + 1) % kPoints == kCable ? levers_[node(contact)] : Position{};
+  }
   void measure_gaps();
 
   Robot robot_;
@@ -97,7 +123,7 @@ class Chain {
   std::vector<State> states_;
   std::vector<Position> levers_;  // cable point from its backbone point
   std::vector<Position> points_;
-  std::vector<Gap> gaps_;
+  std::vector<double> gaps_;
   std::vector<State> pulls_;     // Σ λ ∇c at each node
   std::vector<State> adjoints_;  // of the state each segment leads to
   std::vector<Control> gradient_;

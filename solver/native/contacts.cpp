@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace ccr {
 
@@ -14,26 +15,30 @@ void Direction::add(double scale, const Direction& other) {
     for (int k = 0; k < 3; ++k) states[i][k] += scale * other.states[i][k];
 }
 
-Contacts::Contacts(int segments) : responses_(kMaxActive, Direction(segments)) {}
+Contacts::Contacts(int segments) : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments)) {}
 
-double Contacts::along(const Chain& chain, int contact, const Direction& d) const {
-  return dot(chain.gaps()[contact].slope, d.states[chain.node(contact)]);
+System::Load Contacts::load(const Chain& chain, int contact, int j) {
+  slopes_[j] = chain.slope(contact);
+  return {nullptr, chain.node(contact), slopes_[j], responses_[j].shear.data(), responses_[j].states.data()};
 }
 
+// Takes a contact out, with its slope and response; `responses` counts those in use.
+void Contacts::release(ActiveSet& active, int j, int responses) {
+  std::rotate(slopes_.begin() + j, slopes_.begin() + j + 1, slopes_.begin() + responses);
+  std::rotate(responses_.begin() + j, responses_.begin() + j + 1, responses_.begin() + responses);
+  active.drop(j);
+}
+
+// Cholesky factor of ∇cᵀH⁻¹∇c over the active gaps; false where they depend on each other.
 bool Contacts::factor(const Chain& chain, const ActiveSet& active) {
-  for (int j = 0; j < active.count; ++j) {
+  for (int j = 0; j < active.count; ++j)
     for (int i = j; i < active.count; ++i) {
-      double sum = along(chain, active.contact[i], responses_[j]);
-      const double diagonal = sum;
+      const double entry = along(chain, active.contact[i], i, responses_[j]);
+      double sum = entry;
       for (int k = 0; k < j; ++k) sum -= gram_[i][k] * gram_[j][k];
-      if (i == j) {
-        if (!(sum > kDependent * diagonal)) return false;
-        gram_[j][j] = std::sqrt(sum);
-      } else {
-        gram_[i][j] = sum / gram_[j][j];
-      }
+      if (i == j && !(sum > kDependent * entry)) return false;
+      gram_[i][j] = i == j ? std::sqrt(sum) : sum / gram_[j][j];
     }
-  }
   return true;
 }
 
@@ -48,112 +53,118 @@ void Contacts::apply_inverse(int count, Column& x) const {
   }
 }
 
-void Contacts::drop(ActiveSet& active, int j) {
-  std::rotate(responses_.begin() + j, responses_.begin() + j + 1, responses_.begin() + active.count);
-  active.drop(j);
-}
-
-bool Contacts::settle(const Chain& chain, System& system, const std::vector<double>& penalty, ActiveSet& active,
-                      Direction& step) {
-  for (int j = 0; j < active.count; ++j) {
-    const Gap& gap = chain.gaps()[active.contact[j]];
-    system.respond(chain.node(active.contact[j]), gap.slope, responses_[j].shear.data(), responses_[j].states.data());
-    if (penalty[j] != 0) step.add(-penalty[j] * gap.value, responses_[j]);
-  }
+// Closes the active gaps, releasing those whose multiplier would turn negative.
+void Contacts::settle(const Chain& chain, ActiveSet& active, Direction& step) {
   while (active.count > 0) {
-    if (!factor(chain, active)) {  // dependent: release the weakest
-      const int weakest = static_cast<int>(
-          std::min_element(active.multiplier.begin(), active.multiplier.begin() + active.count) - active.multiplier.begin());
-      step.add(-active.multiplier[weakest], responses_[weakest]);
-      drop(active, weakest);
-      continue;
-    }
-    Column change;
-    for (int j = 0; j < active.count; ++j)
-      change[j] = -chain.gaps()[active.contact[j]].value - along(chain, active.contact[j], step);
-    apply_inverse(active.count, change);
-    int lowest = 0;
-    for (int j = 1; j < active.count; ++j)
-      if (active.multiplier[j] + change[j] < active.multiplier[lowest] + change[lowest]) lowest = j;
-    if (active.multiplier[lowest] + change[lowest] >= 0) {
-      for (int j = 0; j < active.count; ++j) {
-        active.multiplier[j] += change[j];
-        step.add(change[j], responses_[j]);
+    int lowest;
+    const auto begin = active.multiplier.begin(), end = begin + active.count;
+    if (factor(chain, active)) {
+      Column change;
+      for (int j = 0; j < active.count; ++j)
+        change[j] = -chain.gaps()[active.contact[j]] - along(chain, active.contact[j], j, step);
+      apply_inverse(active.count, change);
+      lowest = 0;
+      for (int j = 1; j < active.count; ++j)
+        if (begin[j] + change[j] < begin[lowest] + change[lowest]) lowest = j;
+      if (begin[lowest] + change[lowest] >= 0) {
+        for (int j = 0; j < active.count; ++j) {
+          begin[j] += change[j];
+          step.add(change[j], responses_[j]);
+        }
+        return;
       }
-      return true;
+    } else {
+      lowest = static_cast<int>(std::min_element(begin, end) - begin);
     }
-    step.add(-active.multiplier[lowest], responses_[lowest]);
-    drop(active, lowest);
+    step.add(-begin[lowest], responses_[lowest]);
+    release(active, lowest, active.count);
   }
-  return true;
 }
 
+// Adds a violated gap by dual steps: its multiplier grows until it is closed, releasing whatever turns negative.
 bool Contacts::admit(const Chain& chain, System& system, int contact, ActiveSet& active, Direction& step) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
   if (active.count == kMaxActive) return false;
-  const Gap& gap = chain.gaps()[contact];
-  // The newcomer's response lives behind those of the active set; drop() moves it along.
-  Direction& response = responses_[active.count];
-  system.respond(chain.node(contact), gap.slope, response.shear.data(), response.states.data());
+  const System::Load newcomer = load(chain, contact, active.count);
+  system.respond({&newcomer, 1});
   double multiplier = 0;
   for (;;) {
     const int count = active.count;
-    const Direction& newcomer = responses_[count];
-    const double full = along(chain, contact, newcomer);
-    Column coupling, trade;
-    for (int j = 0; j < count; ++j) coupling[j] = along(chain, active.contact[j], newcomer);
+    const Direction& response = responses_[count];
     if (!factor(chain, active)) return false;
-    trade = coupling;
+    Column coupling, trade;
+    for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(chain, active.contact[j], j, response);
     apply_inverse(count, trade);
+    const double full = along(chain, contact, count, response);
     double curvature = full;
     for (int j = 0; j < count; ++j) curvature -= coupling[j] * trade[j];
 
-    double to_drop = std::numeric_limits<double>::infinity();
+    double to_release = kNever;
     int blocking = -1;
     for (int j = 0; j < count; ++j)
-      if (trade[j] > 0 && active.multiplier[j] / trade[j] < to_drop) {
-        to_drop = active.multiplier[j] / trade[j];
+      if (trade[j] > 0 && active.multiplier[j] / trade[j] < to_release) {
+        to_release = active.multiplier[j] / trade[j];
         blocking = j;
       }
-    const double shortfall = -gap.value - along(chain, contact, step);
-    const double to_close =
-        curvature > kDependent * full ? shortfall / curvature : std::numeric_limits<double>::infinity();
-    const double length = std::min(to_drop, to_close);
-    if (!std::isfinite(length)) return false;
+    const double shortfall = -chain.gaps()[contact] - along(chain, contact, count, step);
+    const double to_close = curvature > kDependent * full ? shortfall / curvature : kNever;
+    const double length = std::min(to_release, to_close);
+    if (!(length < kNever)) return false;
 
-    step.add(length, newcomer);
+    step.add(length, response);
     for (int j = 0; j < count; ++j) {
       step.add(-length * trade[j], responses_[j]);
       active.multiplier[j] = std::max(0.0, active.multiplier[j] - length * trade[j]);
     }
     multiplier += length;
-    if (to_close <= to_drop) {
+    if (to_close <= to_release) {
       active.contact[count] = contact;
       active.multiplier[count] = multiplier;
       ++active.count;
       return true;
     }
-    std::rotate(responses_.begin() + blocking, responses_.begin() + blocking + 1, responses_.begin() + count + 1);
-    active.drop(blocking);
+    release(active, blocking, count + 1);
   }
 }
 
-bool Contacts::solve(const Chain& chain, System& system, const std::vector<double>& penalty, ActiveSet& active,
-                     Direction& step) {
-  if (!settle(chain, system, penalty, active, step)) return false;
-  for (int change = 0; change < kActiveSetChanges; ++change) {
-    int worst = -1;
-    double lowest = -kFeasibility / 2;
-    for (int c = 0; c < chain.contacts(); ++c) {
-      const double predicted = chain.gaps()[c].value + along(chain, c, step);
-      if (predicted < lowest &&
-          std::find(active.contact.begin(), active.contact.begin() + active.count, c) ==
-              active.contact.begin() + active.count) {
-        lowest = predicted;
-        worst = c;
-      }
+int Contacts::most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const {
+  double reach = 0;  // of any point under the step
+  for (const State& d : step.states)
+    reach = std::max(reach, std::abs(d[0]) + std::abs(d[1]) + chain.robot().offset * std::abs(d[2]));
+  int worst = -1;
+  double lowest = -kFeasibility / 2;
+  for (int c = 0; c < chain.contacts(); ++c) {
+    const double gap = chain.gaps()[c];
+    if (gap > 2 * reach) continue;
+    const double predicted = gap + dot(chain.slope(c), step.states[chain.node(c)]);
+    const auto end = active.contact.begin() + active.count;
+    if (predicted < lowest && std::find(active.contact.begin(), end, c) == end) {
+      lowest = predicted;
+      worst = c;
     }
-    if (worst < 0) return true;
-    if (!admit(chain, system, worst, active, step)) return false;
+  }
+  return worst;
+}
+
+bool Contacts::solve(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
+                     ActiveSet& active, Direction& step) {
+  std::array<System::Load, System::kMaxLoads> loads;
+  int count = 0;
+  for (; count < active.count; ++count) loads[count] = load(chain, active.contact[count], count);
+  if (slope) {
+    loads[count++] = {slope, 0, {}, step.shear.data(), step.states.data()};
+  } else {
+    std::fill(step.shear.begin(), step.shear.end(), Control{});
+    std::fill(step.states.begin(), step.states.end(), State{});
+  }
+  system.respond(std::span(loads).first(count));
+  for (int j = 0; j < active.count; ++j)
+    if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
+  settle(chain, active, step);
+  for (int change = 0; change < kActiveSetChanges; ++change) {
+    const int contact = most_violated(chain, active, step);
+    if (contact < 0) return true;
+    if (!admit(chain, system, contact, active, step)) return false;
   }
   return false;
 }

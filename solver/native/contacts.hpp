@@ -21,22 +21,29 @@ class Contacts {
  public:
   Contacts(int segments);
 
-  // On entry `step` minimises the model without further forces and `active` holds the present multipliers, already
-  // part of the model's gradient. On success `step` satisfies every linearised gap and `active` is the new set.
-  // `penalty` is what was added to the curvature of each active gap.
-  bool solve(const Chain& chain, System& system, const std::vector<double>& penalty, ActiveSet& active, Direction& step);
+  // The step that minimises the model at `chain` within every linearised gap. On entry `active` holds the present
+  // multipliers, which are part of the slope of the model; on success it is the new active set. `slope` is that of the
+  // Lagrangian, null for zero; `penalty` is what was added to the curvature of each active gap.
+  bool solve(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
+             ActiveSet& active, Direction& step);
 
  private:
   using Column = std::array<double, limits::kMaxActive>;
 
-  double along(const Chain& chain, int contact, const Direction& d) const;
+  double along(const Chain& chain, int contact, int j, const Direction& d) const {
+    return dot(slopes_[j], d.states[chain.node(contact)]);
+  }
+  System::Load load(const Chain& chain, int contact, int j);
+  void release(ActiveSet& active, int j, int responses);
   bool factor(const Chain& chain, const ActiveSet& active);
   void apply_inverse(int count, Column& x) const;
-  bool settle(const Chain& chain, System& system, const std::vector<double>& penalty, ActiveSet& active, Direction& step);
+  void settle(const Chain& chain, ActiveSet& active, Direction& step);
   bool admit(const Chain& chain, System& system, int contact, ActiveSet& active, Direction& step);
-  void drop(ActiveSet& active, int j);
+  int most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const;
 
-  std::vector<Direction> responses_;  // H⁻¹∇c of the active gaps, in their order
+  // Of the active gaps in their order, then of one that is being admitted.
+  std::vector<State> slopes_;
+  std::vector<Direction> responses_;  // H⁻¹∇c
   std::array<Column, limits::kMaxActive> gram_;
 };
 

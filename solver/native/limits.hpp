@@ -10,7 +10,7 @@ inline constexpr double kRoundoff = 1e-13;
 inline constexpr double kFeasibility = 1e-10;
 
 // Newton.
-inline constexpr int kNewtonIterations = 14;
+inline constexpr int kNewtonIterations = 10;
 inline constexpr double kNewtonCap = 0.3;      // largest shear change of one iteration
 inline constexpr double kArmijo = 1e-4;
 inline constexpr int kBacktracks = 6;
@@ -41,6 +41,7 @@ inline constexpr int kBranchEnds = 24;         // ends met in one step before th
 // Stall: the cable stops where the tension is within this fraction below its limit.
 inline constexpr double kTensionBand = 1e-7;
 inline constexpr int kStallIterations = 40;
+inline constexpr double kCableResolution = 1e-12;  // relative; a narrower bracket is not searched
 
 // Feasible descent after a branch end.
 inline constexpr int kDescentIterations = 300;

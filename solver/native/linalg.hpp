@@ -27,7 +27,7 @@ template <int N>
 using Vec = Mat<N, 1>;
 
 template <int R, int K, int C>
-Mat<R, C> operator*(const Mat<R, K>& a, const Mat<K, C>& b) {
+Mat<R, C> times(const Mat<R, K>& a, const Mat<K, C>& b) {
   Mat<R, C> out;
   for (int r = 0; r < R; ++r)
     for (int k = 0; k < K; ++k)
@@ -52,31 +52,33 @@ double dot(const Vec<N>& a, const Vec<N>& b) {
   return sum;
 }
 
-// In-place lower Cholesky factor; false when the matrix is not positive definite.
+// Factors a symmetric matrix in place as L D Lᵀ: unit L below the diagonal, 1/D on it. False unless positive definite.
 template <int N>
-bool cholesky(Mat<N, N>& a) {
+bool factorize(Mat<N, N>& a) {
   for (int j = 0; j < N; ++j) {
-    for (int k = 0; k < j; ++k) a(j, j) -= a(j, k) * a(j, k);
+    Vec<N> scaled;
+    for (int k = 0; k < j; ++k) {
+      scaled[k] = a(j, k) / a(k, k);
+      a(j, j) -= a(j, k) * scaled[k];
+    }
     if (!(a(j, j) > 0)) return false;
-    a(j, j) = std::sqrt(a(j, j));
+    a(j, j) = 1 / a(j, j);
     for (int i = j + 1; i < N; ++i) {
-      for (int k = 0; k < j; ++k) a(i, j) -= a(i, k) * a(j, k);
-      a(i, j) /= a(j, j);
+      for (int k = 0; k < j; ++k) a(i, j) -= a(i, k) * scaled[k];
+      a(i, j) *= a(j, j);
     }
   }
   return true;
 }
 
 template <int N, int C>
-void cholesky_solve(const Mat<N, N>& l, Mat<N, C>& b) {
+void solve_factored(const Mat<N, N>& factor, Mat<N, C>& b) {
   for (int c = 0; c < C; ++c) {
-    for (int i = 0; i < N; ++i) {
-      for (int k = 0; k < i; ++k) b(i, c) -= l(i, k) * b(k, c);
-      b(i, c) /= l(i, i);
-    }
+    for (int i = 0; i < N; ++i)
+      for (int k = 0; k < i; ++k) b(i, c) -= factor(i, k) * b(k, c);
     for (int i = N - 1; i >= 0; --i) {
-      for (int k = i + 1; k < N; ++k) b(i, c) -= l(k, i) * b(k, c);
-      b(i, c) /= l(i, i);
+      b(i, c) *= factor(i, i);
+      for (int k = i + 1; k < N; ++k) b(i, c) -= factor(k, i) * b(k, c);
     }
   }
 }

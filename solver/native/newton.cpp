@@ -38,7 +38,7 @@ bool Newton::convexify(const ActiveSet& active) {
   for (int attempt = 0; active.count > 0 && attempt < kPenaltyTries; ++attempt, strength *= kPenaltyGrowth) {
     for (int j = 0; j < active.count; ++j) {
       const int node = chain.node(active.contact[j]);
-      const State& slope = chain.gaps()[active.contact[j]].slope;
+      const State slope = chain.slope(active.contact[j]);
       const double reach = chain.robot().length * node;
       const double target = strength / (reach * reach);
       for (int r = 0; r < 3; ++r)
@@ -55,8 +55,7 @@ bool Newton::convexify(const ActiveSet& active) {
 
 // The step to the solution of the quadratic model, and the multipliers there.
 bool Newton::model_step(ActiveSet& target) {
-  system_.descend(chain.gradient().data(), step_.shear.data(), step_.states.data());
-  return contacts_.solve(chain, system_, penalty_, target, step_);
+  return contacts_.solve(chain, system_, chain.gradient().data(), penalty_, target, step_);
 }
 
 double Newton::cap(double largest) const {
@@ -67,7 +66,7 @@ double Newton::cap(double largest) const {
 
 double Newton::merit(double weight) const {
   double violation = 0;
-  for (const Gap& gap : chain.gaps()) violation += std::max(0.0, -gap.value);
+  for (const double gap : chain.gaps()) violation += std::max(0.0, -gap);
   return chain.objective() + weight * violation;
 }
 
@@ -92,7 +91,6 @@ void blend(const ActiveSet& from, double scale, ActiveSet& to) {
 
 Verdict Newton::solve(Iterate& at) {
   Verdict verdict;
-  verdict.stable = true;
   if (!chain.evaluate(at.shear, at.cable)) return verdict;
   double weight = 0;
   for (; verdict.iterations <= kNewtonIterations; ++verdict.iterations) {
@@ -102,14 +100,13 @@ Verdict Newton::solve(Iterate& at) {
       return verdict;
     }
     ActiveSet target = at.active;
-    if (!convexify(at.active) || !model_step(target)) return verdict;
-    verdict.stable = damping_ == 0;
+    if (!convexify(at.active) || damping_ > 0 || !model_step(target)) return verdict;
 
     double slope = 0;  // of the objective along the step
     for (std::size_t i = 0; i < step_.shear.size(); ++i) slope += chain.gradient()[i][0] * step_.shear[i][0];
     for (int j = 0; j < at.active.count; ++j)
       slope += at.active.multiplier[j] *
-               dot(chain.gaps()[at.active.contact[j]].slope, step_.states[chain.node(at.active.contact[j])]);
+               dot(chain.slope(at.active.contact[j]), step_.states[chain.node(at.active.contact[j])]);
     for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
     const double before = merit(weight);
     const double expected = slope - (before - chain.objective());
@@ -141,11 +138,8 @@ bool Newton::restore(Iterate& at) {
   if (!chain.evaluate(at.shear, at.cable)) return false;
   for (int attempt = 0; attempt < kRestorations; ++attempt) {
     if (feasible(kDescentFeasibility)) return true;
-    std::fill(penalty_.begin(), penalty_.end(), 0.0);
-    std::fill(correction_.shear.begin(), correction_.shear.end(), Control{});
-    std::fill(correction_.states.begin(), correction_.states.end(), State{});
     ActiveSet pushed;
-    if (!contacts_.solve(chain, system_, penalty_, pushed, correction_)) return false;
+    if (!contacts_.solve(chain, system_, nullptr, penalty_, pushed, correction_)) return false;
     for (const Control& d : correction_.shear)
       if (!(std::abs(d[0]) <= kDescentCap)) return false;
     advance(at, 1, correction_, at);
@@ -158,8 +152,7 @@ Verdict Newton::descend(Iterate& at, bool& moved) {
   Verdict verdict;
   moved = false;
   if (!measure(at)) return verdict;
-  verdict.stable = damping_ == 0;
-  verdict.converged = equilibrium();
+  verdict.converged = equilibrium() && damping_ == 0;
   if (verdict.converged) return verdict;
   ActiveSet target = at.active;
   if (!model_step(target)) return verdict;

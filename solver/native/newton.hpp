@@ -15,8 +15,7 @@ struct Iterate {
 };
 
 struct Verdict {
-  bool converged = false;
-  bool stable = false;  // the reduced Hessian was positive definite on the active gaps
+  bool converged = false;  // to a stable equilibrium: the curvature is positive along the active gaps
   int iterations = 0;
 };
 
@@ -24,7 +23,8 @@ class Newton {
  public:
   Newton(const Robot& robot, const std::vector<Obstacle>& obstacles);
 
-  // Full-space iteration with an l1 merit search: quadratic, for a start close to an equilibrium.
+  // Iteration with an l1 merit search: quadratic, for a start close to a stable equilibrium. Gives up where the
+  // curvature along the active gaps is not positive.
   Verdict solve(Iterate& at);
 
   // One feasible iterate of energy descent. `from` must be feasible. Returns the verdict on `from`, and where it is not

@@ -1,24 +1,32 @@
 // Newton systems of a chain: minimise ½ Σ (x,u)ᵀ H_i (x,u) + linear terms subject to x⁺ = A x + B u, x_0 = 0.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <span>
 #include <vector>
 
+#include "limits.hpp"
 #include "linalg.hpp"
 
 namespace ccr {
 
-template <int NX, int NU>
+// Transition is the type of A: a Mat<NX, NX>, or anything that multiplies like one and knows its structure.
+template <int NX, int NU, class Transition = Mat<NX, NX>>
 class Riccati {
  public:
+  static constexpr int kMaxLoads = limits::kMaxActive + 1;
+
   struct Stage {
-    Mat<NX, NX> a;    // dynamics
+    Transition a;
     Mat<NX, NU> b;
     Mat<NX, NX> hxx;  // curvature of segment i in its own state and control
     Mat<NU, NX> hux;
     Mat<NU, NU> huu;
   };
 
-  explicit Riccati(int segments) : stages(segments), node_hessian(segments + 1), gain_(segments), factor_(segments), feed_(segments) {}
+  explicit Riccati(int segments)
+      : stages(segments), node_hessian(segments + 1), gain_(segments), factor_(segments) {}
 
   std::vector<Stage> stages;
   std::vector<Mat<NX, NX>> node_hessian;  // curvature added at each node
@@ -30,66 +38,60 @@ class Riccati {
       const Stage& s = stages[i];
       p += node_hessian[i + 1];
       const Mat<NU, NX> btp = transpose_times(s.b, p);
-      Mat<NU, NU> quu = btp * s.b;
+      Mat<NU, NU> quu = times(btp, s.b);
       quu += s.huu;
       for (int k = 0; k < NU; ++k) quu(k, k) += damping;
-      Mat<NU, NX> qux = btp * s.a;
+      Mat<NU, NX> qux = times(btp, s.a);
       qux += s.hux;
-      if (!cholesky(quu)) return false;
+      if (!factorize(quu)) return false;
       factor_[i] = quu;
       gain_[i] = qux;
-      cholesky_solve(quu, gain_[i]);
-      p = transpose_times(s.a, p * s.a);
+      solve_factored(quu, gain_[i]);
+      p = transpose_times(s.a, times(p, s.a));
       p += s.hxx;
       p -= transpose_times(qux, gain_[i]);
     }
     return true;
   }
 
-  // Response of controls du (n) and states dx (n+1) to a force f on one node: H⁻¹ times its reduced gradient.
-  void respond(int node, const Vec<NX>& f, Vec<NU>* du, Vec<NX>* dx) {
-    Vec<NX> v;
-    for (int k = 0; k < NX; ++k) v[k] = -f[k];
-    for (int i = node - 1; i >= 0; --i) {
-      Vec<NU> h = transpose_times(stages[i].b, v);
-      v = transpose_times(stages[i].a, v);
-      v -= transpose_times(gain_[i], h);
-      cholesky_solve(factor_[i], h);
-      feed_[i] = h;
-    }
-    for (std::size_t i = node; i < feed_.size(); ++i) feed_[i] = {};
-    roll(du, dx);
-  }
+  // Something to respond to, a slope of the controls or a force on one node, and where its response goes.
+  struct Load {
+    const Vec<NU>* slope;  // (n) or null
+    int node;              // used where slope is null
+    Vec<NX> force;
+    Vec<NU>* du;  // (n)
+    Vec<NX>* dx;  // (n+1)
+  };
 
-  // Response to a reduced gradient g on the controls: -H⁻¹ g.
-  void descend(const Vec<NU>* g, Vec<NU>* du, Vec<NX>* dx) {
-    Vec<NX> v;
+  // Solves for several loads in one sweep: H⁻¹ times the force, or -H⁻¹ times the slope.
+  void respond(std::span<const Load> loads) {
+    std::array<Vec<NX>, kMaxLoads> v{};
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
-      Vec<NU> h = transpose_times(stages[i].b, v);
-      h += g[i];
-      v = transpose_times(stages[i].a, v);
-      v -= transpose_times(gain_[i], h);
-      cholesky_solve(factor_[i], h);
-      feed_[i] = h;
+      const Stage& s = stages[i];
+      for (std::size_t k = 0; k < loads.size(); ++k) {
+        if (!loads[k].slope && loads[k].node == i + 1) v[k] -= loads[k].force;
+        Vec<NU> h = transpose_times(s.b, v[k]);
+        if (loads[k].slope) h += loads[k].slope[i];
+        v[k] = transpose_times(s.a, v[k]);
+        v[k] -= transpose_times(gain_[i], h);
+        solve_factored(factor_[i], h);
+        loads[k].du[i] = h;
+      }
     }
-    roll(du, dx);
+    for (const Load& load : loads) load.dx[0] = {};
+    for (std::size_t i = 0; i < stages.size(); ++i)
+      for (const Load& load : loads) {
+        Vec<NU> u = times(gain_[i], load.dx[i]);
+        u += load.du[i];
+        for (int c = 0; c < NU; ++c) load.du[i][c] = -u[c];
+        load.dx[i + 1] = times(stages[i].a, load.dx[i]);
+        load.dx[i + 1] += times(stages[i].b, load.du[i]);
+      }
   }
 
  private:
-  void roll(Vec<NU>* du, Vec<NX>* dx) const {
-    dx[0] = {};
-    for (std::size_t i = 0; i < stages.size(); ++i) {
-      du[i] = {};
-      du[i] -= feed_[i];
-      du[i] -= gain_[i] * dx[i];
-      dx[i + 1] = stages[i].a * dx[i];
-      dx[i + 1] += stages[i].b * du[i];
-    }
-  }
-
   std::vector<Mat<NU, NX>> gain_;
   std::vector<Mat<NU, NU>> factor_;
-  std::vector<Vec<NU>> feed_;
 };
 
 }  // namespace ccr
