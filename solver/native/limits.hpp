@@ -23,10 +23,12 @@ inline constexpr double kDependent = 1e-12;    // relative curvature below which
 // Convexification: penalty on active gaps first, then damping of the shear, relative to the curvature at hand.
 inline constexpr double kPenalty = 100.0;
 inline constexpr double kPenaltyGrowth = 100.0;
-inline constexpr int kPenaltyTries = 2;
-inline constexpr double kDamping = 1e-3;
-inline constexpr double kDampingGrowth = 4.0;
-inline constexpr int kDampingTries = 40;
+inline constexpr int kPenalties = 4;
+inline constexpr int kDescentPenalties = 2;
+inline constexpr double kDamping = 1e-8;
+inline constexpr double kDampingGrowth = 8.0;
+inline constexpr int kDampingTries = 24;
+inline constexpr double kMeasureDamping = 1.0; // where closeness of shapes is meant, not energy
 
 // Continuation.
 inline constexpr double kPretension = 0.05;    // cable displacement below which a touching robot is not slackened
@@ -46,7 +48,9 @@ inline constexpr double kCableResolution = 1e-12;  // relative; a narrower brack
 // Feasible descent after a branch end.
 inline constexpr int kDescentIterations = 300;
 inline constexpr double kDescentCap = 0.03;    // largest shear change of one iterate
-inline constexpr double kDescentFeasibility = 1e-9;
+inline constexpr double kDescentFeasibility = 1e-11;
+inline constexpr double kHeld = 1e100;         // multiplier of a gap that a restoration must not release
+inline constexpr double kEnergyRoundoff = 1e-15;
 inline constexpr int kDescentBacktracks = 12;
 inline constexpr int kRestorations = 8;
 inline constexpr double kDescentMove = 4.0;    // largest node motion of one iterate

@@ -24,33 +24,39 @@ bool Newton::equilibrium() const {
   return worst <= kStationarity * free * free + kRoundoff * chain.steepest() && feasible(kFeasibility);
 }
 
-// Exact curvature where it is positive; else a penalty on the active gaps, which leaves the solution where it is;
-// else damping, which only shortens the way there.
-bool Newton::convexify(const ActiveSet& active) {
+// Exact curvature where it is positive; else a penalty on the active gaps, which leaves the solution where it is.
+bool Newton::convex(const ActiveSet& active, int penalties) {
   damping_ = 0;
-  std::fill(penalty_.begin(), penalty_.end(), 0.0);
-  chain.curvature(active, system_);
+  shape_system(active, 0);
   if (system_.factor(0)) return true;
-
-  double scale = 0;
-  for (const System::Stage& stage : system_.stages) scale = std::max(scale, std::abs(stage.huu[0]));
-  double strength = kPenalty * scale;
-  for (int attempt = 0; active.count > 0 && attempt < kPenaltyTries; ++attempt, strength *= kPenaltyGrowth) {
-    for (int j = 0; j < active.count; ++j) {
-      const int node = chain.node(active.contact[j]);
-      const State slope = chain.slope(active.contact[j]);
-      const double reach = chain.robot().length * node;
-      const double target = strength / (reach * reach);
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) system_.node_hessian[node](r, c) += (target - penalty_[j]) * slope[r] * slope[c];
-      penalty_[j] = target;
-    }
+  double strength = kPenalty * steepest_curvature();
+  for (int attempt = 0; active.count > 0 && attempt < penalties; ++attempt, strength *= kPenaltyGrowth) {
+    shape_system(active, strength);
     if (system_.factor(0)) return true;
   }
-  damping_ = kDamping * scale;
+  return false;
+}
+
+// Else damping, which only shortens the way there.
+bool Newton::convexify(const ActiveSet& active) {
+  if (convex(active, kDescentPenalties)) return true;
+  damping_ = kDamping * steepest_curvature();
   for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
     if (system_.factor(damping_)) return true;
   return false;
+}
+
+void Newton::shape_system(const ActiveSet& active, double strength) {
+  chain.curvature(active, system_);
+  for (int j = 0; j < active.count; ++j) {
+    const int node = chain.node(active.contact[j]);
+    const double reach = chain.robot().length * node;
+    penalty_[j] = strength / (reach * reach);
+    if (strength == 0) continue;
+    const State slope = chain.slope(active.contact[j]);
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) system_.node_hessian[node](r, c) += penalty_[j] * slope[r] * slope[c];
+  }
 }
 
 // The step to the solution of the quadratic model, and the multipliers there.
@@ -100,7 +106,7 @@ Verdict Newton::solve(Iterate& at) {
       return verdict;
     }
     ActiveSet target = at.active;
-    if (!convexify(at.active) || damping_ > 0 || !model_step(target)) return verdict;
+    if (!convex(at.active, kPenalties) || !model_step(target)) return verdict;
 
     double slope = 0;  // of the objective along the step
     for (std::size_t i = 0; i < step_.shear.size(); ++i) slope += chain.gradient()[i][0] * step_.shear[i][0];
@@ -131,41 +137,67 @@ Verdict Newton::solve(Iterate& at) {
 bool Newton::measure(const Iterate& at) {
   if (!chain.evaluate(at.shear, at.cable)) return false;
   chain.reduced_gradient(at.active);
-  return convexify(at.active);
+  return convexify(at.active) && system_.factor(damping_ + kMeasureDamping * steepest_curvature());
+}
+
+double Newton::steepest_curvature() const {
+  double steepest = 0;
+  for (const System::Stage& stage : system_.stages) steepest = std::max(steepest, std::abs(stage.huu[0]));
+  return steepest;
 }
 
 bool Newton::restore(Iterate& at) {
   if (!chain.evaluate(at.shear, at.cable)) return false;
   for (int attempt = 0; attempt < kRestorations; ++attempt) {
-    if (feasible(kDescentFeasibility)) return true;
-    ActiveSet pushed;
-    if (!contacts_.solve(chain, system_, nullptr, penalty_, pushed, correction_)) return false;
+    if (on_surface(at.active)) return true;
+    ActiveSet held = at.active;
+    std::fill_n(held.multiplier.begin(), held.count, kHeld);
+    std::fill(penalty_.begin(), penalty_.end(), 0.0);
+    if (!contacts_.solve(chain, system_, nullptr, penalty_, held, correction_)) return false;
     for (const Control& d : correction_.shear)
       if (!(std::abs(d[0]) <= kDescentCap)) return false;
     advance(at, 1, correction_, at);
     if (!chain.evaluate(at.shear, at.cable)) return false;
   }
-  return feasible(kDescentFeasibility);
+  return on_surface(at.active);
+}
+
+// Those of a set that touch: an open gap pushes nothing.
+ActiveSet Newton::closed(const ActiveSet& active) const {
+  ActiveSet kept;
+  for (int j = 0; j < active.count; ++j) {
+    if (chain.gaps()[active.contact[j]] > kFeasibility) continue;
+    kept.contact[kept.count] = active.contact[j];
+    kept.multiplier[kept.count++] = active.multiplier[j];
+  }
+  return kept;
+}
+
+bool Newton::on_surface(const ActiveSet& active) const {
+  double farthest = chain.violation();
+  for (int j = 0; j < active.count; ++j) farthest = std::max(farthest, chain.gaps()[active.contact[j]]);
+  return farthest <= kDescentFeasibility;
 }
 
 Verdict Newton::descend(Iterate& at, bool& moved) {
   Verdict verdict;
   moved = false;
-  if (!measure(at)) return verdict;
-  verdict.converged = equilibrium() && damping_ == 0;
-  if (verdict.converged) return verdict;
+  if (!chain.evaluate(at.shear, at.cable)) return verdict;
+  chain.reduced_gradient(at.active);
+  verdict.converged = equilibrium() && convex(at.active, kPenalties);
+  if (verdict.converged || !convexify(at.active)) return verdict;
   ActiveSet target = at.active;
   if (!model_step(target)) return verdict;
   const double before = chain.objective();
   double scale = cap(kDescentCap);
   trial_.cable = at.cable;
+  trial_.active = closed(target);
   for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= 2) {
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
-    if (chain.objective() > before * (1 + 1e-13)) continue;
+    if (chain.objective() > before + kEnergyRoundoff * before) continue;
     std::swap(at.shear, trial_.shear);
-    blend(at.active, scale, target);
-    at.active = target;
+    at.active = closed(target);
     moved = true;
     return verdict;
   }

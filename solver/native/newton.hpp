@@ -33,16 +33,21 @@ class Newton {
 
   // Takes the curvature at `at` as the measure of motion for restore; false when it cannot be made positive.
   bool measure(const Iterate& at);
-  // Smallest motion that meets every gap again; false when there is none nearby.
+  // Smallest motion that closes the active gaps exactly and meets every other; false when there is none nearby.
   bool restore(Iterate& at);
 
   Chain chain;  // evaluated at the last iterate
 
  private:
   bool equilibrium() const;
+  ActiveSet closed(const ActiveSet& active) const;
+  bool on_surface(const ActiveSet& active) const;
   bool feasible(double tolerance) const { return chain.violation() <= tolerance; }
+  bool convex(const ActiveSet& active, int penalties);
   bool convexify(const ActiveSet& active);
+  void shape_system(const ActiveSet& active, double strength);
   bool model_step(ActiveSet& target);
+  double steepest_curvature() const;
   double cap(double largest) const;
   double merit(double weight) const;
 
