@@ -53,24 +53,34 @@ void Contacts::apply_inverse(int count, Column& x) const {
   }
 }
 
+// Change of the multipliers that closes the active gaps.
+Contacts::Column Contacts::closing(const Chain& chain, const ActiveSet& active, const Direction& step) const {
+  Column change;
+  for (int j = 0; j < active.count; ++j)
+    change[j] = -chain.gaps()[active.contact[j]] - along(chain, active.contact[j], j, step);
+  apply_inverse(active.count, change);
+  return change;
+}
+
+void Contacts::push(const Column& change, ActiveSet& active, Direction& step) const {
+  for (int j = 0; j < active.count; ++j) {
+    active.multiplier[j] += change[j];
+    step.add(change[j], responses_[j]);
+  }
+}
+
 // Closes the active gaps, releasing those whose multiplier would turn negative.
 void Contacts::settle(const Chain& chain, ActiveSet& active, Direction& step) {
   while (active.count > 0) {
     int lowest;
     const auto begin = active.multiplier.begin(), end = begin + active.count;
     if (factor(chain, active)) {
-      Column change;
-      for (int j = 0; j < active.count; ++j)
-        change[j] = -chain.gaps()[active.contact[j]] - along(chain, active.contact[j], j, step);
-      apply_inverse(active.count, change);
+      const Column change = closing(chain, active, step);
       lowest = 0;
       for (int j = 1; j < active.count; ++j)
         if (begin[j] + change[j] < begin[lowest] + change[lowest]) lowest = j;
       if (begin[lowest] + change[lowest] >= 0) {
-        for (int j = 0; j < active.count; ++j) {
-          begin[j] += change[j];
-          step.add(change[j], responses_[j]);
-        }
+        push(change, active, step);
         return;
       }
     } else {
@@ -167,6 +177,18 @@ bool Contacts::solve(const Chain& chain, System& system, const Control* slope, c
     if (!admit(chain, system, contact, active, step)) return false;
   }
   return false;
+}
+
+bool Contacts::correct(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
+                       ActiveSet& active, Direction& step) {
+  const System::Load load{slope, 0, {}, step.shear.data(), step.states.data()};
+  system.respond({&load, 1});
+  for (int j = 0; j < active.count; ++j)
+    if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
+  if (!factor(chain, active)) return false;
+  push(closing(chain, active, step), active, step);
+  const auto end = active.multiplier.begin() + active.count;
+  return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
 }
 
 }  // namespace ccr

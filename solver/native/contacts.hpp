@@ -27,6 +27,11 @@ class Contacts {
   bool solve(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
              ActiveSet& active, Direction& step);
 
+  // A further step from a point close by, on the same active set and with the curvature and responses of the last
+  // solve. False when a multiplier would turn negative.
+  bool correct(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
+               ActiveSet& active, Direction& step);
+
  private:
   using Column = std::array<double, limits::kMaxActive>;
 
@@ -38,6 +43,8 @@ class Contacts {
   bool factor(const Chain& chain, const ActiveSet& active);
   void apply_inverse(int count, Column& x) const;
   void settle(const Chain& chain, ActiveSet& active, Direction& step);
+  Column closing(const Chain& chain, const ActiveSet& active, const Direction& step) const;
+  void push(const Column& change, ActiveSet& active, Direction& step) const;
   bool admit(const Chain& chain, System& system, int contact, ActiveSet& active, Direction& step);
   int most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const;
 

@@ -12,6 +12,7 @@ inline constexpr double kFeasibility = 1e-10;
 // Newton.
 inline constexpr int kNewtonIterations = 10;
 inline constexpr double kNewtonCap = 0.3;      // largest shear change of one iteration
+inline constexpr double kNewtonClose = 1e-4;    // after a change this small the curvature is used once more
 inline constexpr double kArmijo = 1e-4;
 inline constexpr int kBacktracks = 6;
 

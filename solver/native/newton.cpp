@@ -99,6 +99,7 @@ Verdict Newton::solve(Iterate& at) {
   Verdict verdict;
   if (!chain.evaluate(at.shear, at.cable)) return verdict;
   double weight = 0;
+  bool close = false;
   for (; verdict.iterations <= kNewtonIterations; ++verdict.iterations) {
     chain.reduced_gradient(at.active);
     if (equilibrium()) {
@@ -106,6 +107,16 @@ Verdict Newton::solve(Iterate& at) {
       return verdict;
     }
     ActiveSet target = at.active;
+    if (close) {  // the last curvature still serves
+      close = false;
+      if (contacts_.correct(chain, system_, chain.gradient().data(), penalty_, target, step_)) {
+        advance(at, 1, step_, at);
+        at.active = target;
+        if (!chain.evaluate(at.shear, at.cable)) return verdict;
+        continue;
+      }
+      target = at.active;
+    }
     if (!convex(at.active, kPenalties) || !model_step(target)) return verdict;
 
     double slope = 0;  // of the objective along the step
@@ -130,6 +141,7 @@ Verdict Newton::solve(Iterate& at) {
     std::swap(at.shear, trial_.shear);
     blend(at.active, scale, target);
     at.active = target;
+    close = cap(kNewtonClose) == 1;
   }
   return verdict;
 }
