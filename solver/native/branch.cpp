@@ -86,16 +86,17 @@ bool Branch::passable(double allowed) const {
   for (const Obstacle& obstacle : chain.obstacles()) {
     if (obstacle.shape != Shape::kCircle) continue;
     const double core = (1 - kSweepDepth) * obstacle.parameters[2];
-    for (int k = 0; k < kPoints * nodes; ++k) {
-      if (!obstacle.touchable[k % nodes]) continue;
-      const double px = points_[k][0] - obstacle.parameters[0], py = points_[k][1] - obstacle.parameters[1];
-      if (px * px + py * py > (core + allowed) * (core + allowed)) continue;
-      const double dx = chain.points()[k][0] - points_[k][0], dy = chain.points()[k][1] - points_[k][1];
-      const double length = dx * dx + dy * dy;
-      const double t = length > 0 ? std::clamp(-(px * dx + py * dy) / length, 0.0, 1.0) : 0.0;
-      const double qx = px + t * dx, qy = py + t * dy;
-      if (qx * qx + qy * qy < core * core) return false;
-    }
+    for (int first = 0; first < kPoints * nodes; first += nodes)
+      for (int i = 0; i < nodes; ++i) {
+        const double px = points_[first + i][0] - obstacle.parameters[0];
+        const double py = points_[first + i][1] - obstacle.parameters[1];
+        if (!obstacle.touchable[i] || px * px + py * py > (core + allowed) * (core + allowed)) continue;
+        const double dx = chain.points()[first + i][0] - points_[first + i][0];
+        const double dy = chain.points()[first + i][1] - points_[first + i][1];
+        const double length = dx * dx + dy * dy;
+        const double t = length > 0 ? std::clamp(-(px * dx + py * dy) / length, 0.0, 1.0) : 0.0;
+        if (std::hypot(px + t * dx, py + t * dy) < core) return false;
+      }
   }
   return true;
 }

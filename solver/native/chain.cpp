@@ -40,7 +40,12 @@ Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
       gaps_(obstacles.size() * points_.size()),
       pulls_(robot.segments + 1),
       adjoints_(robot.segments),
-      gradient_(robot.segments) {}
+      gradient_(robot.segments) {
+  for (int c = 0; c < contacts(); ++c) {
+    const int points = kPoints * (robot.segments + 1);
+    sites_.push_back({c / points, c % points, c % (robot.segments + 1)});
+  }
+}
 
 #if defined(__GNUC__)
 [[gnu::flatten]]  // the law is worth inlining here
@@ -78,9 +83,9 @@ void Chain::measure_gaps() {
   const int nodes = robot_.segments + 1;
   double* gap = gaps_.data();
   for (const Obstacle& obstacle : obstacles_)
-    for (int k = 0; k < kPoints * nodes; ++k)
-      *gap++ = obstacle.touchable[k % nodes] ? gap_law(obstacle, points_[k]).value
-                                             : std::numeric_limits<double>::infinity();
+    for (const Position* point = points_.data(); point != points_.data() + points_.size(); point += nodes)
+      for (int i = 0; i < nodes; ++i)
+        *gap++ = obstacle.touchable[i] ? gap_law(obstacle, point[i]).value : std::numeric_limits<double>::infinity();
 }
 
 State Chain::slope(int contact) const {

@@ -87,9 +87,7 @@ class Chain {
   const Robot& robot() const { return robot_; }
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
   int contacts() const { return static_cast<int>(gaps_.size()); }
-  int node(int contact) const { return contact % (robot_.segments + 1); }
-  const Obstacle& obstacle(int contact) const { return obstacles_[contact / (kPoints * (robot_.segments + 1))]; }
-  bool touchable(int contact) const { return obstacle(contact).touchable[node(contact)]; }
+  int node(int contact) const { return sites_[contact].node; }
 
   double objective() const { return objective_; }
   double violation() const;  // largest -gap, at least 0
@@ -110,9 +108,16 @@ class Chain {
     double dx, dy;
   };
 
-  const Position& point(int contact) const { return points_[contact % points_.size()]; }
+  // What a contact index stands for.
+  struct Site {
+    int obstacle, point, node;  // point: (point, node) as one index
+  };
+
+  const Obstacle& obstacle(int contact) const { return obstacles_[sites_[contact].obstacle]; }
+  const Position& point(int contact) const { return points_[sites_[contact].point]; }
   Position lever(int contact) const {
-    return contact / (robot_.segments + 1) % kPoints == kCable ? levers_[node(contact)] : Position{};
+    const Site& site = sites_[contact];
+    return site.point == site.node ? Position{} : levers_[site.node];
   }
   void measure_gaps();
 
@@ -123,6 +128,7 @@ class Chain {
   std::vector<State> states_;
   std::vector<Position> levers_;  // cable point from its backbone point
   std::vector<Position> points_;
+  std::vector<Site> sites_;
   std::vector<double> gaps_;
   std::vector<State> pulls_;     // Σ λ ∇c at each node
   std::vector<State> adjoints_;  // of the state each segment leads to
