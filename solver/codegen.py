@@ -7,14 +7,14 @@ import casadi as ca
 from formulation import GAP_LAWS, gap_function, segment_function
 
 
-def generate(directory: Path) -> None:
-    """Write ``laws.c`` and ``laws.h`` into an existing directory."""
-    generator = ca.CodeGenerator("laws", {"with_header": True, "casadi_int": "int"})
-    generator.add(segment_function())
-    for kind in GAP_LAWS:
-        generator.add(gap_function(kind))
+def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
+    """Write ``name.c`` into an existing directory."""
+    generator = ca.CodeGenerator(name, {"casadi_int": "int"})
+    for function in functions:
+        generator.add(function)
     generator.generate(f"{directory}/")
 
 
 if __name__ == "__main__":
-    generate(Path(sys.argv[1]))
+    generate("segment_law", [segment_function()], Path(sys.argv[1]))
+    generate("gap_laws", [gap_function(kind) for kind in GAP_LAWS], Path(sys.argv[1]))

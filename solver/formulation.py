@@ -2,8 +2,8 @@
 
 Three layers, all in millimetre and radian:
 
-- *segment law*: the angle between consecutive disks as a function of the shear angle, the reduced coordinate
-  that eliminates the length equalities of eq. 4;
+- *segment law*: the angle between consecutive disks as a function of σ = sin ψ, the sine of the shear angle, which
+  is the reduced coordinate that eliminates the length equalities of eq. 4;
 - *gap laws*: signed clearance of a point from an obstacle, scaled so that its gradient has unit length on the
   surface and a multiplier has units rad²/mm;
 - *node-coordinate problem*: eq. 4/5 of the paper as they stand, for the reference solver and for the certificate.
@@ -17,21 +17,21 @@ from typing import NamedTuple
 import casadi as ca
 
 
-def segment_half_sine(shear: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
+def segment_half_sine(sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
     """``u = sin θ/2`` of a segment whose cable is ``pull`` shorter than its backbone; θ is the angle between its disks.
 
     The chord ``2a·u`` between the free ends of the disks is ``l0 cos ψ − sqrt(la² − l0² sin² ψ)`` with
     ``la = l0 − pull``; it is written as a quotient so that no digits are lost for a small pull.
     """
     cable = length - pull
-    reach = length * ca.cos(shear) + ca.sqrt(cable**2 - (length * ca.sin(shear)) ** 2)
+    reach = length * ca.sqrt(1 - sine**2) + ca.sqrt(cable**2 - (length * sine) ** 2)
     return pull * (length + cable) / (reach * 2 * offset)
 
 
-def segment_closure(half_sine: ca.SX, shear: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
+def segment_closure(half_sine: ca.SX, sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
     """Cable length of a segment squared, minus its value: zero at :func:`segment_half_sine` [mm²]."""
     chord = 2 * offset * half_sine
-    return chord * (chord - 2 * length * ca.cos(shear)) + pull * (2 * length - pull)
+    return chord * (chord - 2 * length * ca.sqrt(1 - sine**2)) + pull * (2 * length - pull)
 
 
 def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -48,33 +48,36 @@ GAP_LAWS = {"circle": circle_gap, "half_plane": half_plane_gap}
 
 
 def segment_function() -> ca.Function:
-    """``(ψ, pull, l0, a) → θ, θ_ψ, θ_ψψ, θ_pull, cos(ψ − θ/2), sin(ψ − θ/2), cos θ, sin θ``.
+    """``(σ, pull, l0, a) → θ, θ_σ, θ_σσ, θ_pull, cos ζ, sin ζ, ζ_σ, ζ_σσ, cos θ, sin θ``.
 
-    ``ψ − θ/2`` is the direction of the backbone segment in the frame of its lower disk, from that frame's y axis. The
-    derivatives follow from the closure by the implicit function theorem, which costs one division in all.
+    ``ζ = ψ − θ/2`` is the direction of the backbone segment in the frame of its lower disk, from that frame's y axis.
+    The derivatives of θ follow from the closure by the implicit function theorem, which costs one division in all.
     """
-    shear, pull, length, offset, u = (ca.SX.sym(name) for name in ("shear", "pull", "length", "offset", "half_sine"))
-    closure = segment_closure(u, shear, pull, length, offset)
-    in_u, in_shear, in_pull = (ca.gradient(closure, variable) for variable in (u, shear, pull))
+    sine, pull, length, offset, u = (ca.SX.sym(name) for name in ("sine", "pull", "length", "offset", "half_sine"))
+    closure = segment_closure(u, sine, pull, length, offset)
+    in_u, in_sine, in_pull = (ca.gradient(closure, variable) for variable in (u, sine, pull))
     per_closure = -1 / in_u
-    u_shear = in_shear * per_closure
+    u_sine = in_sine * per_closure
     u_pull = in_pull * per_closure
-    bent = ca.gradient(in_shear, shear) + 2 * ca.gradient(in_shear, u) * u_shear + ca.gradient(in_u, u) * u_shear**2
-    half_cosine = ca.sqrt(1 - u**2)
-    per_cosine = 1 / half_cosine
-    sine, cosine = ca.sin(shear), ca.cos(shear)
+    bent = ca.gradient(in_sine, sine) + 2 * ca.gradient(in_sine, u) * u_sine + ca.gradient(in_u, u) * u_sine**2
+    cosine, half_cosine = ca.sqrt(1 - sine**2), ca.sqrt(1 - u**2)
+    per_cosine, per_half_cosine = 1 / cosine, 1 / half_cosine
+    slope = 2 * per_half_cosine * u_sine
+    curvature = 2 * per_half_cosine * (bent * per_closure + u * (per_half_cosine * u_sine) ** 2)
     law = ca.vertcat(
         2 * ca.asin(u),
-        2 * per_cosine * u_shear,
-        2 * per_cosine * (bent * per_closure + u * (per_cosine * u_shear) ** 2),
-        2 * per_cosine * u_pull,
+        slope,
+        curvature,
+        2 * per_half_cosine * u_pull,
         cosine * half_cosine + sine * u,
         sine * half_cosine - cosine * u,
+        per_cosine - slope / 2,
+        sine * per_cosine**3 - curvature / 2,
         1 - 2 * u**2,
         2 * u * half_cosine,
     )
-    law = ca.cse(ca.substitute(law, u, segment_half_sine(shear, pull, length, offset)))
-    return ca.Function("ccr_segment", [shear, pull, length, offset], [law])
+    law = ca.cse(ca.substitute(law, u, segment_half_sine(sine, pull, length, offset)))
+    return ca.Function("ccr_segment", [sine, pull, length, offset], [law])
 
 
 def gap_function(kind: str) -> ca.Function:

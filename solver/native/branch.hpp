@@ -15,8 +15,8 @@ class Branch {
  public:
   Branch(const Robot& robot, const std::vector<Obstacle>& obstacles);
 
-  // An equilibrium as one block of numbers, in this order: cable, tension, objective; shear (n); x, y, angle of each
-  // node; x, y of each cable point; multiplier of each contact; gap of each contact.
+  // An equilibrium as one block of numbers, in this order: cable, tension, objective; sine of the shear angle of
+  // each segment; x, y, angle of each node; x, y of each cable point; multiplier of each contact; gap of each contact.
   std::size_t block_size() const;
 
   // Takes the cable from the equilibrium in one block towards `target` and writes the one reached to another.

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
-// The generated laws, inlined here.
+// The generated laws of the gaps, inlined here.
 #define CASADI_SYMBOL_EXPORT static inline
-#include "laws.c"
+#include "gap_laws.c"
 
 namespace ccr {
 
@@ -47,23 +46,17 @@ Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
   }
 }
 
-#if defined(__GNUC__)
-[[gnu::flatten]]  // the law is worth inlining here
-#endif
 bool Chain::evaluate(const std::vector<Control>& shear, double cable) {
   const int n = robot_.segments;
   pull_ = cable / n;
   objective_ = steepest_ = 0;
+  bend_segments(n, shear[0].v.data(), pull_, robot_.length, robot_.offset, bends_.data());
   states_[0] = {};
   levers_[0] = {{robot_.offset, 0}};
+  const double scale = robot_.length / robot_.offset;
   for (int i = 0; i < n; ++i) {
     Bend& bend = bends_[i];
-    const double* in[] = {shear[i].v.data(), &pull_, &robot_.length, &robot_.offset};
-    double* out[] = {&bend.angle};
-    ccr_segment(in, out, nullptr, nullptr, 0);
-    if (!(std::abs(shear[i][0]) < std::numbers::pi / 2) || !std::isfinite(bend.angle)) return false;
     const double c = levers_[i][0], s = levers_[i][1];  // of the lower disk, times the offset
-    const double scale = robot_.length / robot_.offset;
     bend.dx = -scale * (s * bend.forward + c * bend.sideways);
     bend.dy = scale * (c * bend.forward - s * bend.sideways);
     levers_[i + 1] = {{c * bend.cosine + s * bend.sine, s * bend.cosine - c * bend.sine}};
@@ -71,6 +64,7 @@ bool Chain::evaluate(const std::vector<Control>& shear, double cable) {
     objective_ += bend.angle * bend.angle;
     steepest_ = std::max(steepest_, std::abs(2 * bend.angle * bend.slope));
   }
+  if (!std::isfinite(objective_)) return false;
   for (int i = 0; i <= n; ++i) {
     points_[i] = {{states_[i][0], states_[i][1]}};
     points_[n + 1 + i] = {{states_[i][0] + levers_[i][0], states_[i][1] + levers_[i][1]}};
@@ -113,7 +107,7 @@ void Chain::reduced_gradient(const ActiveSet& active) {
     adjoints_[i] = p;
     // A turn of the segment moves the next node by (-dy, dx).
     const double turn = p[1] * bend.dx - p[0] * bend.dy;
-    gradient_[i][0] = 2 * bend.angle * bend.slope + turn * (1 - bend.slope / 2) - p[2] * bend.slope;
+    gradient_[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
     p[2] += turn;
   }
 }
@@ -124,15 +118,15 @@ void Chain::curvature(const ActiveSet& active, System& system) const {
     const State& p = adjoints_[i];
     const double turn = p[1] * bend.dx - p[0] * bend.dy;
     const double inward = -(p[0] * bend.dx + p[1] * bend.dy);
-    const double heading = 1 - bend.slope / 2;  // of the segment, per shear
+    const double heading = bend.heading_slope;
     System::Stage& stage = system.stages[i];
     stage.a = {-bend.dy, bend.dx};
     stage.b = {{-bend.dy * heading, bend.dx * heading, -bend.slope}};
     stage.hxx = {};
     stage.hxx(2, 2) = inward;
     stage.hux = {{0, 0, inward * heading}};
-    stage.huu = {{2 * (bend.slope * bend.slope + bend.angle * bend.curvature) + inward * heading * heading -
-                  (turn / 2 + p[2]) * bend.curvature}};
+    stage.huu = {{2 * (bend.slope * bend.slope + bend.angle * bend.curvature) + inward * heading * heading +
+                  turn * bend.heading_curvature - p[2] * bend.curvature}};
   }
   std::fill(system.node_hessian.begin(), system.node_hessian.end(), Mat<3, 3>{});
   for (int j = 0; j < active.count; ++j) {

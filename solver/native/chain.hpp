@@ -7,6 +7,7 @@
 #include "limits.hpp"
 #include "linalg.hpp"
 #include "riccati.hpp"
+#include "segment.hpp"
 
 namespace ccr {
 
@@ -28,7 +29,7 @@ struct Obstacle {
 };
 
 using State = Vec<3>;    // x, y, disk angle
-using Control = Vec<1>;  // shear
+using Control = Vec<1>;  // sine of the shear angle
 using Position = Vec<2>;
 
 // Dynamics of a segment in its lower state: the identity, and the motion of the next node per turn of the disk.
@@ -100,14 +101,6 @@ class Chain {
   const std::vector<Control>& gradient() const { return gradient_; }
 
  private:
-  // Output of the generated segment law, and the backbone segment in the base frame.
-  struct Bend {
-    double angle, slope, curvature, pull_slope;  // θ, θ_ψ, θ_ψψ, θ_pull
-    double forward, sideways;                    // cos and sin of the segment's direction from the lower disk's y axis
-    double cosine, sine;                         // of θ
-    double dx, dy;
-  };
-
   // What a contact index stands for.
   struct Site {
     int obstacle, point, node;  // point: (point, node) as one index
