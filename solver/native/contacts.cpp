@@ -15,7 +15,7 @@ void Direction::add(double scale, const Direction& other) {
     for (int k = 0; k < 3; ++k) states[i][k] += scale * other.states[i][k];
 }
 
-Contacts::Contacts(int segments) : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments)) {}
+Contacts::Contacts(int segments) : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments)), loads_(kMaxActive + 1) {}
 
 System::Load Contacts::load(const Chain& chain, int contact, int j) {
   slopes_[j] = chain.slope(contact);
@@ -158,16 +158,15 @@ int Contacts::most_violated(const Chain& chain, const ActiveSet& active, const D
 
 bool Contacts::solve(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
                      ActiveSet& active, Direction& step) {
-  std::array<System::Load, System::kMaxLoads> loads;
   int count = 0;
-  for (; count < active.count; ++count) loads[count] = load(chain, active.contact[count], count);
+  for (; count < active.count; ++count) loads_[count] = load(chain, active.contact[count], count);
   if (slope) {
-    loads[count++] = {slope, 0, {}, step.shear.data(), step.states.data()};
+    loads_[count++] = {slope, 0, {}, step.shear.data(), step.states.data()};
   } else {
     std::fill(step.shear.begin(), step.shear.end(), Control{});
     std::fill(step.states.begin(), step.states.end(), State{});
   }
-  system.respond(std::span(loads).first(count));
+  system.respond(std::span(loads_).first(count));
   for (int j = 0; j < active.count; ++j)
     if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
   settle(chain, active, step);

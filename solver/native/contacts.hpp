@@ -51,6 +51,7 @@ class Contacts {
   // Of the active gaps in their order, then of one that is being admitted.
   std::vector<State> slopes_;
   std::vector<Direction> responses_;  // H⁻¹∇c
+  std::vector<System::Load> loads_;
   std::array<Column, limits::kMaxActive> gram_;
 };
 

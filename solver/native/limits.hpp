@@ -42,7 +42,7 @@ inline constexpr int kSubSteps = 400;
 inline constexpr int kBranchEnds = 24;         // ends met in one step before the robot counts as jammed
 
 // Stall: the cable stops where the tension is within this fraction below its limit.
-inline constexpr double kTensionBand = 1e-7;
+inline constexpr double kTensionBand = 1e-6;
 inline constexpr int kStallIterations = 40;
 inline constexpr double kCableResolution = 1e-12;  // relative; a narrower bracket is not searched
 

@@ -1,7 +1,7 @@
 // Newton systems of a chain: minimise ½ Σ (x,u)ᵀ H_i (x,u) + linear terms subject to x⁺ = A x + B u, x_0 = 0.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -65,7 +65,8 @@ class Riccati {
 
   // Solves for several loads in one sweep: H⁻¹ times the force, or -H⁻¹ times the slope.
   void respond(std::span<const Load> loads) {
-    std::array<Vec<NX>, kMaxLoads> v{};
+    std::vector<Vec<NX>>& v = carried_;
+    std::fill_n(v.begin(), loads.size(), Vec<NX>{});
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
       const Stage& s = stages[i];
       for (std::size_t k = 0; k < loads.size(); ++k) {
@@ -92,6 +93,7 @@ class Riccati {
  private:
   std::vector<Mat<NU, NX>> gain_;
   std::vector<Mat<NU, NU>> factor_;
+  std::vector<Vec<NX>> carried_{kMaxLoads};
 };
 
 }  // namespace ccr
