@@ -153,6 +153,18 @@ bool Branch::approach_limit() {
   return true;
 }
 
+// The quadratic end of a descent, where Newton's method stays close and loses energy.
+bool Branch::finish() {
+  const double energy = newton_.chain.objective();
+  trial_ = present_;
+  const Verdict verdict = newton_.solve(trial_);
+  iterations += verdict.iterations;
+  if (!verdict.converged || newton_.chain.objective() > energy || !passable(kDescentMove)) return false;
+  std::swap(present_, trial_);
+  remember();
+  return true;
+}
+
 // The branch ends within the smallest step: descend from its end, feasible and slowly, to where the robot goes.
 Branch::End Branch::pass_end(double increment) {
   const Iterate start = present_;
@@ -174,10 +186,12 @@ Branch::End Branch::pass_end(double increment) {
   for (int i = 0; i < kDescentIterations && moved && passable(kDescentMove); ++i) {
     std::swap(present_, trial_);
     remember();
-    trial_ = present_;
-    const Verdict verdict = newton_.descend(trial_, moved);
-    ++iterations;
-    if (!verdict.converged) continue;
+    if (i % kFinishEvery != kFinishEvery - 1 || !finish()) {
+      trial_ = present_;
+      ++iterations;
+      if (!newton_.descend(trial_, moved).converged) continue;
+    }
+    settled_ = false;
     settle();
     if (increment > 0 && tension_ > newton_.chain.robot().max_tension) break;
     double farthest = 0;

@@ -37,6 +37,7 @@ class Branch {
   bool approach_limit();
   bool at_limit() const;
   End pass_end(double increment);
+  bool finish();
   bool passable(double allowed) const;
   double measure_tension() const;
   void accept();

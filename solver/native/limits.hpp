@@ -48,6 +48,7 @@ inline constexpr double kCableResolution = 1e-12;  // relative; a narrower brack
 
 // Feasible descent after a branch end.
 inline constexpr int kDescentIterations = 300;
+inline constexpr int kFinishEvery = 8;         // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;    // largest shear change of one iterate
 inline constexpr double kDescentFeasibility = 1e-11;
 inline constexpr double kHeld = 1e100;         // multiplier of a gap that a restoration must not release

@@ -203,8 +203,9 @@ Verdict Newton::descend(Iterate& at, bool& moved) {
   const double before = chain.objective();
   double scale = cap(kDescentCap);
   trial_.cable = at.cable;
-  trial_.active = closed(target);
+  const ActiveSet touching = closed(target);
   for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= 2) {
+    trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap that is to push
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
     if (chain.objective() > before + kEnergyRoundoff * before) continue;
