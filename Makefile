@@ -1,0 +1,32 @@
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALL := $(VENV)/.installed
+
+.PHONY: demo test bench soak lint clean
+
+demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controller, write a figure and a video to runs/demo
+	$(BIN)/ccr-gym train --run runs/demo
+	$(BIN)/ccr-gym evaluate --run runs/demo
+
+test: $(INSTALL)
+	$(BIN)/python -m pytest
+
+lint: $(INSTALL)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+bench: $(INSTALL)
+	$(BIN)/python benchmarks/kernel.py
+
+soak: $(INSTALL)
+	$(BIN)/python -m pytest tests/solver/test_soak.py --soak 200000
+
+$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/*) solver/formulation.py solver/codegen.py
+	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) build dist runs

@@ -1,0 +1,1 @@
+"""Learners, classical controllers and the command line on top of ccr_gym."""
