@@ -40,9 +40,13 @@ class Circle:
         """Which of the nodes 0…n can touch it: all, ``(nodes,)`` bool."""
         return np.ones(nodes, dtype=bool)
 
-    def moved(self, x: float, y: float) -> "Circle":
-        """A copy with its centre displaced by (x, y) [mm]."""
-        return Circle(center=(self.center[0] + x, self.center[1] + y), radius=self.radius)
+    def gap(self, points: np.ndarray) -> np.ndarray:
+        """Gaps of points ``(..., 2)`` [mm]; positive outside."""
+        return (((points - self.center) ** 2).sum(-1) - self.radius**2) / (2 * self.radius)
+
+    def normal_at(self, point: np.ndarray) -> np.ndarray:
+        """Gradient of the gap at a point, the outward unit normal on the surface, ``(2,)``."""
+        return (point - self.center) / self.radius
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +97,14 @@ class HalfPlane:
         if max(self.nodes) >= nodes:
             raise ValueError(f"HalfPlane names node {max(self.nodes)}; the robot's nodes are 0 to {nodes - 1}")
         return np.isin(np.arange(nodes), self.nodes)
+
+    def gap(self, points: np.ndarray) -> np.ndarray:
+        """Gaps of points ``(..., 2)`` [mm]; positive outside."""
+        return points @ np.array(self.normal) - self.parameters[2]
+
+    def normal_at(self, point: np.ndarray) -> np.ndarray:
+        """Outward unit normal, the same everywhere, ``(2,)``."""
+        return np.array(self.normal)
 
 
 Obstacle = Circle | HalfPlane

@@ -1,0 +1,161 @@
+"""Contact force, read in two ways: by energy, and by the paper's virtual work (section 4, eq. 6–11).
+
+Both are forces on the robot, in newton, in the base frame, one row per obstacle, zero where nothing touches. The
+two are different quantities: the virtual-work estimate knows the tension and the free kinematics only, is free of
+material constants, and is fitted to an experiment through μ; the energy force is that of the model itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.equilibrium import Equilibrium
+from solver.robot import Robot
+from solver.scene import Scene
+
+
+def force_true(equilibrium: Equilibrium) -> np.ndarray:
+    """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 2)`` [N]."""
+    forces = np.zeros((len(equilibrium.scene), 2))
+    for obstacle, multiplier, normal in _contacts(equilibrium):
+        forces[obstacle] += equilibrium.robot.stiffness * multiplier * normal
+    return forces
+
+
+@dataclass(frozen=True, slots=True)
+class Onset:
+    """Where the present contact began, which the estimate counts the cable load from.
+
+    Attributes:
+        tension: Cable tension at the onset [N]; ``None`` while nothing touches.
+    """
+
+    tension: float | None = None
+
+    def after(self, before: Equilibrium, now: Equilibrium) -> "Onset":
+        """The onset after a step: kept during a contact, forgotten when it ends, found when one begins.
+
+        A contact that begins inside a step does so on the free robot; the tension there is that of the free robot at
+        the cable displacement where it first touches.
+        """
+        if not now.contact.any():
+            return Onset()
+        if self.tension is not None:
+            return self
+        if before.contact.any():
+            return Onset(before.tension)
+        return Onset(free_tension(now.robot, _first_touch(now.robot, now.scene, before.cable_mm, now.cable_mm)))
+
+
+@dataclass(frozen=True, slots=True)
+class VirtualWork:
+    """The paper's estimator: ``Σ N_j (n_j + μ t_j)·x' = a P_l φ'`` with the slopes x', φ' of the free tip.
+
+    ``n`` is the outward normal, ``t`` the same turned by +90°, ``P_l`` the tension since the onset of the contact. For a
+    wall with normal (−1, 0) this is eq. 11. Several obstacles share one unknown in proportion to their multipliers.
+
+    Attributes:
+        friction: Ratio μ of tangential to normal force, found from one experiment (:meth:`calibrated`).
+    """
+
+    friction: float = 0.0
+
+    def estimate(self, equilibrium: Equilibrium, onset: Onset) -> np.ndarray:
+        """Estimated contact force, ``(m, 2)`` [N]."""
+        directions = np.zeros((len(equilibrium.scene), 2))
+        if onset.tension is None:
+            return directions
+        for obstacle, multiplier, normal in _contacts(equilibrium):
+            directions[obstacle] += multiplier * (normal + self.friction * np.array([-normal[1], normal[0]]))
+        slopes = tip_slopes(equilibrium.robot, equilibrium.cable_mm)
+        work = float((directions @ slopes[:2]).sum())
+        load = equilibrium.robot.offset_mm * (equilibrium.tension - onset.tension) * slopes[2]
+        return directions * (load / work) if work < 0 else np.zeros_like(directions)
+
+    @classmethod
+    def calibrated(cls, force: float, load: float, slopes: np.ndarray, offset_mm: float) -> "VirtualWork":
+        """The estimator whose μ makes eq. 11 give a force measured on a wall across +x at a known cable load.
+
+        Args:
+            force: Measured magnitude of P_x, in the unit of ``load``.
+            load: Cable load P_l since contact.
+            slopes: Tip slopes (f'_x, f'_y, φ'), ``(3,)`` [mm/mm, mm/mm, rad/mm].
+            offset_mm: Distance of the cable from the backbone [mm].
+
+        Raises:
+            ValueError: If force or load is not positive.
+        """
+        if not (force > 0 and load > 0):
+            raise ValueError(f"force is {force}, load is {load}; both must be positive")
+        return cls(friction=float((-offset_mm * load * slopes[2] / force - slopes[0]) / slopes[1]))
+
+
+def tip_slopes(robot: Robot, cable_mm: float) -> np.ndarray:
+    """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
+    angle = free_angle(robot, cable_mm)
+    turn = 1 / np.sqrt((robot.segments * robot.offset_mm) ** 2 - cable_mm**2 / 4)  # dθ/dl
+    middles = np.arange(robot.segments) + 0.5
+    along = robot.segment_mm * middles * turn
+    return np.array(
+        [
+            (along * np.cos(middles * angle)).sum(),
+            -(along * np.sin(middles * angle)).sum(),
+            -robot.segments * turn,
+        ]
+    )
+
+
+def free_angle(robot: Robot, cable_mm: float) -> float:
+    """Angle between consecutive disks of the free robot, whose shear vanishes [rad]."""
+    return float(2 * np.arcsin(cable_mm / (2 * robot.segments * robot.offset_mm)))
+
+
+def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
+    """Node poses of the free robot, ``(n+1, 3)`` [mm, mm, rad]."""
+    angle = free_angle(robot, cable_mm)
+    nodes = np.zeros((robot.segments + 1, 3))
+    middles = (np.arange(robot.segments) + 0.5) * angle
+    nodes[1:, 0] = robot.segment_mm * np.cumsum(np.sin(middles))
+    nodes[1:, 1] = robot.segment_mm * np.cumsum(np.cos(middles))
+    nodes[:, 2] = -angle * np.arange(robot.segments + 1)
+    return nodes
+
+
+def free_tension(robot: Robot, cable_mm: float) -> float:
+    """Cable tension of the free robot, ``B dJ/dl`` [N]."""
+    angle = free_angle(robot, cable_mm)
+    turn = 1 / np.sqrt((robot.segments * robot.offset_mm) ** 2 - cable_mm**2 / 4)
+    return float(2 * robot.stiffness * robot.segments * angle * turn)
+
+
+def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
+    """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact."""
+    nodes = free_nodes(robot, cable_mm)
+    cable = nodes[:, :2] + robot.offset_mm * np.stack([np.cos(nodes[:, 2]), np.sin(nodes[:, 2])], axis=1)
+    points = np.stack([nodes[:, :2], cable])
+    gaps = [obstacle.gap(points)[:, obstacle.touchable(len(nodes))].min() for obstacle in scene]
+    return float(min(gaps, default=np.inf))
+
+
+def _first_touch(robot: Robot, scene: Scene, clear: float, touching: float) -> float:
+    """Cable displacement where the free robot first touches, between a clear one and one in contact [mm]."""
+    if clearance(robot, scene, touching) >= 0:
+        return touching
+    for _ in range(30):
+        middle = (clear + touching) / 2
+        clear, touching = (middle, touching) if clearance(robot, scene, middle) > 0 else (clear, middle)
+    return touching
+
+
+def _contacts(equilibrium: Equilibrium) -> list[tuple[int, float, np.ndarray]]:
+    """(obstacle, multiplier, outward normal) of every contact."""
+    multipliers = equilibrium.multipliers
+    points = (equilibrium.nodes, equilibrium.cable_nodes)
+    return [
+        (obstacle, multipliers[obstacle, point, node], _normal(equilibrium, obstacle, points[point][node, :2]))
+        for obstacle, point, node in zip(*(index.tolist() for index in np.nonzero(multipliers)), strict=True)
+    ]
+
+
+def _normal(equilibrium: Equilibrium, obstacle: int, point: np.ndarray) -> np.ndarray:
+    return equilibrium.scene.obstacles[obstacle].normal_at(point)
