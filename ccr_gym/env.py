@@ -1,6 +1,7 @@
-"""The environments: one physical transition, observed and rewarded."""
+"""What every environment shares: one physical transition, observed and rewarded."""
 
-from typing import Any, ClassVar, Literal, SupportsFloat
+import math
+from typing import Any, Literal, SupportsFloat
 
 import gymnasium
 import numpy as np
@@ -9,7 +10,7 @@ from gymnasium import spaces
 from ccr_gym.observation import FORCE_SCALE_N, Reading, dict_space, flat_space, flatten, observe
 from ccr_gym.rendering import Frame, Renderer
 from ccr_gym.reward import RewardWeights, reward_terms
-from ccr_gym.tasks import Assignment, LoadCell, PushObstacle, Task, assign
+from ccr_gym.tasks import Assignment, Task, assign
 from solver import Equilibrium, Robot, Solver
 from solver.forces import Onset, VirtualWork, force_true
 from solver.reference import ReferenceSolver
@@ -22,7 +23,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
     Args:
         task: What an episode asks.
-        robot: The robot; the paper's prototype by default.
+        robot: The robot, or a mapping of its fields; the paper's prototype by default.
         obs_mode: ``"dict"`` or ``"flat"``.
         force_sensor: Whether the exact contact force is observed beside the virtual-work estimate.
         max_increment_mm: Cable increment of a full action [mm].
@@ -37,12 +38,15 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         ValueError: If an argument is out of range; the message names the bound.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
+    metadata: dict[str, Any] = {  # noqa: RUF012 - an instance variable in the base class
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 20,
+    }
 
     def __init__(
         self,
         task: Task,
-        robot: Robot | None = None,
+        robot: Robot | dict[str, Any] | None = None,
         obs_mode: Literal["dict", "flat"] = "dict",
         force_sensor: bool = True,
         max_increment_mm: float = 0.5,
@@ -53,7 +57,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         backend: Literal["native", "casadi"] = "native",
         render_mode: str | None = None,
     ) -> None:
-        self.robot = robot or Robot.prototype()
+        self.robot = Robot(**robot) if isinstance(robot, dict) else robot or Robot.prototype()
         _require(obs_mode in ("dict", "flat"), f"obs_mode is {obs_mode!r}; it must be 'dict' or 'flat'")
         _require(backend in ("native", "casadi"), f"backend is {backend!r}; it must be 'native' or 'casadi'")
         _require(
@@ -79,8 +83,10 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self.backend = backend
         self.render_mode = render_mode
         self.estimator = VirtualWork(friction)
-        space = dict_space(self.robot, force_sensor)
-        self.observation_space = flat_space(space) if obs_mode == "flat" else space  # type: ignore[assignment]
+        self._dict_space = dict_space(self.robot, force_sensor)
+        flat = obs_mode == "flat"
+        space: spaces.Space[Any] = flat_space(self._dict_space) if flat else self._dict_space
+        self.observation_space = space
         self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
         self._renderer: Renderer | None = None
         self._solver: Solver | ReferenceSolver | None = None
@@ -120,12 +126,10 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         if self._solver is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         pull = np.asarray(action, dtype=np.float64)
-        _require(
-            pull.shape == (1,) and bool(np.isfinite(pull).all()),
-            f"action is {action!r}; it must be one finite number in an array of shape (1,)",
-        )
-        pull = pull.clip(-1.0, 1.0)
-        command = self._equilibrium.cable_mm + float(pull[0]) * self.max_increment_mm
+        if pull.shape != (1,) or not math.isfinite(pull[0]):
+            raise ValueError(f"action is {action!r}; it must be one finite number in an array of shape (1,)")
+        effort = min(max(float(pull[0]), -1.0), 1.0)
+        command = self._equilibrium.cable_mm + effort * self.max_increment_mm
         before = self._equilibrium
         self._equilibrium = self._solver.step(before, min(max(command, 0.0), self.cable_limit_mm))
         self._onset = self._onset.after(before, self._equilibrium)
@@ -137,14 +141,14 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             np.float64(self._desired),
             self._equilibrium.gaps.min(initial=np.inf),
             touching,
-            pull[0],
+            np.float64(effort),
         )
         if self.render_mode == "human":
             self.render()
         info = self._info({name: float(value) for name, value in terms.items()})
         return self._observe(), sum(info["reward_terms"].values()), False, False, info
 
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
+    def render(self) -> np.ndarray | None:
         """The robot, obstacles, contacts, forces and set-point: ``(H, W, 3)`` uint8, or a window in human mode."""
         if self.render_mode is None or self._solver is None:
             gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human', and a reset")
@@ -175,7 +179,9 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             f"options has {sorted(options)}; give both 'scene' and 'desired_force', or neither",
         )
         force = options["desired_force"]
-        _require(0 < force <= FORCE_SCALE_N, f"desired_force is {force}; it must be positive and at most {FORCE_SCALE_N}")
+        _require(
+            0 < force <= FORCE_SCALE_N, f"desired_force is {force}; it must be positive and at most {FORCE_SCALE_N}"
+        )
         return Assignment(Solver(self.robot, options["scene"]), float(force))
 
     def _measure(self) -> None:
@@ -185,7 +191,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def _observe(self) -> Observation:
         reading = Reading(self._equilibrium, self._force_true, self._force_est, self._desired, self.cable_limit_mm)
-        observation = observe(reading, self.force_sensor)
+        observation = observe(reading, self._dict_space)
         return flatten(observation) if self.obs_mode == "flat" else observation
 
     def _info(self, terms: dict[str, float]) -> dict[str, Any]:
@@ -200,20 +206,6 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             "is_success": abs(self._force_size - self._desired) <= 0.05 * self._desired,
             "reward_terms": terms,
         }
-
-
-class LoadCellEnv(ContactEnv):
-    """PLACEHOLDER"""
-
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(kwargs.pop("task", LoadCell()), **kwargs)
-
-
-class PushObstacleEnv(ContactEnv):
-    """PLACEHOLDER"""
-
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(kwargs.pop("task", PushObstacle()), **kwargs)
 
 
 def _require(condition: bool, message: str) -> None:

@@ -47,28 +47,27 @@ def dict_space(robot: Robot, force_sensor: bool) -> spaces.Dict:
 def flat_space(space: spaces.Dict) -> spaces.Box:
     """One box with the entries of the dictionary in order."""
     boxes = [box for box in space.values() if isinstance(box, spaces.Box)]
-    return spaces.Box(*(np.concatenate([getattr(box, end) for box in boxes]) for end in ("low", "high")))
+    return spaces.Box(np.concatenate([box.low for box in boxes]), np.concatenate([box.high for box in boxes]))
 
 
-def observe(reading: Reading, force_sensor: bool) -> dict[str, np.ndarray]:
-    """Scaled float32 arrays within the bounds of :func:`dict_space`."""
+def observe(reading: Reading, space: spaces.Dict) -> dict[str, np.ndarray]:
+    """Scaled float32 arrays within the bounds of :func:`dict_space`, views of one vector in the order of the keys."""
     equilibrium = reading.equilibrium
     length = equilibrium.robot.length_mm
     error = reading.desired_force - np.hypot(*reading.force_measured)
-    observation = {
-        "cable": np.array([equilibrium.cable_mm / reading.cable_limit_mm]),
+    values: dict[str, np.ndarray | tuple[float]] = {
+        "cable": (equilibrium.cable_mm / reading.cable_limit_mm,),
         "contact": equilibrium.contact.any(axis=0).ravel(),
-        "desired_force": np.array([reading.desired_force / FORCE_SCALE_N]),
-        "force_error": np.array([error / FORCE_SCALE_N]),
+        "desired_force": (reading.desired_force / FORCE_SCALE_N,),
+        "force_error": (error / FORCE_SCALE_N,),
         "force_est": reading.force_est / FORCE_SCALE_N,
         "force_measured": reading.force_measured / FORCE_SCALE_N,
         "nodes": (equilibrium.nodes / (length, length, np.pi)).ravel(),
     }
-    return {
-        key: np.clip(value, -1.0, 1.0).astype(np.float32)
-        for key, value in observation.items()
-        if force_sensor or key not in SENSOR_KEYS
-    }
+    vector = np.concatenate([values[key] for key in space]).astype(np.float32)
+    np.clip(vector, -1.0, 1.0, out=vector)
+    ends = np.cumsum([len(values[key]) for key in space]).tolist()
+    return {key: vector[end - len(values[key]) : end] for key, end in zip(space, ends, strict=True)}
 
 
 def flatten(observation: dict[str, np.ndarray]) -> np.ndarray:
@@ -77,4 +76,4 @@ def flatten(observation: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def _box(low: float, shape: tuple[int, ...]) -> spaces.Box:
-    return spaces.Box(low, 1.0, shape, np.float32)
+    return spaces.Box(np.full(shape, low, np.float32), np.ones(shape, np.float32))

@@ -5,8 +5,8 @@ import gymnasium
 MAX_EPISODE_STEPS = 64
 
 ENV_IDS = {
-    "CCR/LoadCell-v0": "ccr_gym.env:LoadCellEnv",
-    "CCR/PushObstacle-v0": "ccr_gym.env:PushObstacleEnv",
+    "CCR/LoadCell-v0": "ccr_gym.environments:LoadCellEnv",
+    "CCR/PushObstacle-v0": "ccr_gym.environments:PushObstacleEnv",
 }
 
 

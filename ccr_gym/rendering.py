@@ -49,7 +49,7 @@ class Layout:
     """Lengths of the picture: ``*_mm`` in the world [mm], the rest in units of which its shorter side has 640."""
 
     short_side: float = 640.0
-    supersampling: int = 3
+    supersampling: int = 4
 
     left_mm: float = -60.0
     right_mm: float = 150.0

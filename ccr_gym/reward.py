@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-Reals = npt.NDArray[np.float64]
+Reals = npt.NDArray[np.float64] | np.float64
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,12 @@ class RewardWeights:
 
 
 def reward_terms(
-    weights: RewardWeights, force: Reals, desired: Reals, clearance: Reals, touching: npt.NDArray[np.bool_], action: Reals
+    weights: RewardWeights,
+    force: Reals,
+    desired: Reals,
+    clearance: Reals,
+    touching: npt.NDArray[np.bool_] | np.bool_,
+    action: Reals,
 ) -> dict[str, Reals]:
     """Weighted terms whose sum is the reward.
 

@@ -71,7 +71,7 @@ class Equilibrium:
     @property
     def shear(self) -> np.ndarray:
         """Shear angle ψ of each segment, ``(n,)`` [rad]."""
-        return np.arcsin(self.block[3 : 3 + self.robot.segments])
+        return np.asarray(np.arcsin(self.block[3 : 3 + self.robot.segments]))
 
     @property
     def nodes(self) -> np.ndarray:

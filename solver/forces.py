@@ -51,8 +51,8 @@ class Onset:
 class VirtualWork:
     """The paper's estimator: ``Σ N_j (n_j + μ t_j)·x' = a P_l φ'`` with the slopes x', φ' of the free tip.
 
-    ``n`` is the outward normal, ``t`` the same turned by +90°, ``P_l`` the tension since the onset of the contact. For a
-    wall with normal (−1, 0) this is eq. 11. Several obstacles share one unknown in proportion to their multipliers.
+    ``n`` is the outward normal, ``t`` the same turned by +90°, ``P_l`` the tension since the onset of the contact. For
+    a wall with normal (−1, 0) this is eq. 11. Several obstacles share one unknown in proportion to their multipliers.
 
     Attributes:
         friction: Ratio μ of tangential to normal force, found from one experiment (:meth:`calibrated`).

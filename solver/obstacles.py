@@ -42,7 +42,7 @@ class Circle:
 
     def gap(self, points: np.ndarray) -> np.ndarray:
         """Gaps of points ``(..., 2)`` [mm]; positive outside."""
-        return (((points - self.center) ** 2).sum(-1) - self.radius**2) / (2 * self.radius)
+        return np.asarray((((points - self.center) ** 2).sum(-1) - self.radius**2) / (2 * self.radius))
 
     def normal_at(self, point: np.ndarray) -> np.ndarray:
         """Gradient of the gap at a point, the outward unit normal on the surface, ``(2,)``."""
@@ -96,11 +96,11 @@ class HalfPlane:
             return np.ones(nodes, dtype=bool)
         if max(self.nodes) >= nodes:
             raise ValueError(f"HalfPlane names node {max(self.nodes)}; the robot's nodes are 0 to {nodes - 1}")
-        return np.isin(np.arange(nodes), self.nodes)
+        return np.asarray(np.isin(np.arange(nodes), self.nodes))
 
     def gap(self, points: np.ndarray) -> np.ndarray:
         """Gaps of points ``(..., 2)`` [mm]; positive outside."""
-        return points @ np.array(self.normal) - self.parameters[2]
+        return np.asarray(points @ np.array(self.normal) - self.parameters[2])
 
     def normal_at(self, point: np.ndarray) -> np.ndarray:
         """Outward unit normal, the same everywhere, ``(2,)``."""

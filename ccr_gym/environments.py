@@ -1,0 +1,125 @@
+"""The registered environments."""
+
+from typing import Any
+
+from ccr_gym.env import ContactEnv
+from ccr_gym.tasks import LoadCell, PushObstacle
+
+
+class LoadCellEnv(ContactEnv):
+    """Hold a set-point force on the paper's load cell (Fig. 8–10).
+
+    ## Description
+    A flat load cell stands at a random distance from a planar cable-driven continuum robot. Pulling the cable bends
+    the robot towards it until node 14, the paper's 15th, meets it (eq. 12); pulling on raises the contact force. The
+    agent commands cable increments and is to hold a desired force.
+
+    ## Action Space
+    `Box(-1, 1, (1,), float32)`: cable increment as a fraction of `max_increment_mm`; positive pulls. The cable moves
+    as far as its tension limit and the obstacles allow, within 0 to `cable_limit_mm`.
+
+    ## Observation Space
+    With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their concatenation in this order. Indices
+    are of the flat form for the default robot of n = 18 segments; everything is clipped to its bounds.
+
+    | Index | Key | Meaning | Scale | Bounds |
+    | --- | --- | --- | --- | --- |
+    | 0 | `cable` | cable displacement | `cable_limit_mm` (14 mm) | [0, 1] |
+    | 1–19 | `contact` | multiplier > 0 at the backbone point of nodes 0…n | flag | {0, 1} |
+    | 20–38 | `contact` | multiplier > 0 at the cable point of nodes 0…n | flag | {0, 1} |
+    | 39 | `desired_force` | set-point | 0.5 N | [0, 1] |
+    | 40 | `force_error` | set-point minus measured magnitude | 0.5 N | [-1, 1] |
+    | 41–42 | `force_est` | virtual-work estimate of the force on the robot, x and y (eq. 11) | 0.5 N | [-1, 1] |
+    | 43–44 | `force_measured` | force on the robot from an ideal force sensor, x and y | 0.5 N | [-1, 1] |
+    | 45–101 | `nodes` | x, y, disk angle of nodes 0…n, node by node | 180 mm, 180 mm, π rad | [-1, 1] |
+
+    Without `force_sensor` the keys `force_error` and `force_measured` are absent.
+
+    ## Rewards
+    The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the set-point:
+    `force_error` −min(|F−F_d|/F_d, 1); `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), 1) / 2;
+    `approach` minus the clearance in units of 100 mm while nothing touches; `effort` −0.02 a².
+
+    ## Starting State
+    The straight robot, cable slack. The distance is uniform in 24–51 mm and the set-point in 10–60 mN, drawn again
+    until a steady pull reaches the set-point.
+
+    ## Episode End
+    No state is terminal. Episodes are truncated after 64 steps.
+
+    ## Info
+    `force_true` and `force_est` (force on the robot, (2,) [N]), `desired_force` [N], `cable_mm`, `tension` [N],
+    `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success` (within 5 % of
+    the set-point), `reward_terms`.
+
+    ## Arguments
+    All those of `ContactEnv`, and `task`: `LoadCell` or a mapping of its fields; mappings make every
+    argument JSON-able.
+
+    ## Version History
+    * v0: initial version.
+    """
+
+    def __init__(self, task: LoadCell | dict[str, Any] | None = None, **kwargs: Any) -> None:
+        """See the class; `kwargs` are those of `ContactEnv`."""
+        super().__init__(LoadCell(**task) if isinstance(task, dict) else task or LoadCell(), **kwargs)
+
+
+class PushObstacleEnv(ContactEnv):
+    """Find a circular obstacle and push it with a desired force.
+
+    ## Description
+    A circular obstacle of random position and size lies somewhere in front of a planar cable-driven continuum robot.
+    Pulling the cable bends the robot towards it; where and when it touches, and how the force then grows with the
+    cable, depends on the scene. The agent commands cable increments and is to hold a desired contact force.
+
+    ## Action Space
+    `Box(-1, 1, (1,), float32)`: cable increment as a fraction of `max_increment_mm`; positive pulls. The cable moves
+    as far as its tension limit and the obstacles allow, within 0 to `cable_limit_mm`.
+
+    ## Observation Space
+    With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their concatenation in this order. Indices
+    are of the flat form for the default robot of n = 18 segments; everything is clipped to its bounds.
+
+    | Index | Key | Meaning | Scale | Bounds |
+    | --- | --- | --- | --- | --- |
+    | 0 | `cable` | cable displacement | `cable_limit_mm` (14 mm) | [0, 1] |
+    | 1–19 | `contact` | multiplier > 0 at the backbone point of nodes 0…n | flag | {0, 1} |
+    | 20–38 | `contact` | multiplier > 0 at the cable point of nodes 0…n | flag | {0, 1} |
+    | 39 | `desired_force` | set-point | 0.5 N | [0, 1] |
+    | 40 | `force_error` | set-point minus measured magnitude | 0.5 N | [-1, 1] |
+    | 41–42 | `force_est` | virtual-work estimate of the force on the robot, x and y (eq. 11) | 0.5 N | [-1, 1] |
+    | 43–44 | `force_measured` | force on the robot from an ideal force sensor, x and y | 0.5 N | [-1, 1] |
+    | 45–101 | `nodes` | x, y, disk angle of nodes 0…n, node by node | 180 mm, 180 mm, π rad | [-1, 1] |
+
+    Without `force_sensor` the keys `force_error` and `force_measured` are absent.
+
+    ## Rewards
+    The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the set-point:
+    `force_error` −min(|F−F_d|/F_d, 1); `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), 1) / 2;
+    `approach` minus the clearance in units of 100 mm while nothing touches; `effort` −0.02 a².
+
+    ## Starting State
+    The straight robot, cable slack. The obstacle's centre is uniform in 35–75 × 75–150 mm, its radius in 10–16 mm, the
+    set-point in 20–150 mN, drawn again until the straight robot is clear of the obstacle and a steady pull reaches the
+    set-point without a stall, jam or snap.
+
+    ## Episode End
+    No state is terminal. Episodes are truncated after 64 steps.
+
+    ## Info
+    `force_true` and `force_est` (force on the robot, (2,) [N]), `desired_force` [N], `cable_mm`, `tension` [N],
+    `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success` (within 5 % of
+    the set-point), `reward_terms`.
+
+    ## Arguments
+    All those of `ContactEnv`, and `task`: `PushObstacle` or a mapping of its fields; mappings make every
+    argument JSON-able.
+
+    ## Version History
+    * v0: initial version.
+    """
+
+    def __init__(self, task: PushObstacle | dict[str, Any] | None = None, **kwargs: Any) -> None:
+        """See the class; `kwargs` are those of `ContactEnv`."""
+        super().__init__(PushObstacle(**task) if isinstance(task, dict) else task or PushObstacle(), **kwargs)

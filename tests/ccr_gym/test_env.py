@@ -1,0 +1,183 @@
+"""Invariants that every registered environment keeps."""
+
+import json
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as sb3_check_env
+
+import ccr_gym
+from ccr_gym.environments import PushObstacleEnv
+from ccr_gym.observation import FORCE_SCALE_N
+from solver import Circle, Scene, Status
+
+EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
+EVERY_MODE = pytest.mark.parametrize("obs_mode", ["dict", "flat"])
+
+
+def make(env_id: str, **kwargs):
+    return gymnasium.make(env_id, disable_env_checker=True, **kwargs)
+
+
+def play(env, actions):
+    """Everything an episode returns, in one flat list of arrays."""
+    observation, info = env.reset(seed=3)
+    record = [observation, info["force_true"], info["force_est"]]
+    for action in actions:
+        observation, reward, terminated, truncated, info = env.step(action)
+        record += [observation, reward, info["force_true"], info["force_est"], info["solver_status"]]
+        assert not terminated
+        if truncated:
+            break
+    return record
+
+
+@EVERY_ID
+@EVERY_MODE
+def test_checkers_pass_without_a_warning(env_id, obs_mode):
+    env = gymnasium.make(env_id, obs_mode=obs_mode, render_mode="rgb_array")
+    check_env(env.unwrapped)
+    sb3_check_env(env)
+
+
+@EVERY_ID
+def test_same_seed_same_bits(env_id):
+    actions = np.random.default_rng(0).uniform(-0.5, 1, (64, 1)).astype(np.float32)
+    first, second = (play(make(env_id, obs_mode="flat"), actions) for _ in range(2))
+    assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+
+
+@EVERY_ID
+def test_flat_is_the_dict_in_order(env_id):
+    flat, _ = make(env_id, obs_mode="flat").reset(seed=5)
+    entries, _ = make(env_id, obs_mode="dict").reset(seed=5)
+    assert np.array_equal(flat, np.concatenate(list(entries.values())))
+    assert list(entries) == list(make(env_id).observation_space)
+
+
+@EVERY_ID
+@EVERY_MODE
+def test_observations_stay_in_bounds_and_rewards_add_up(env_id, obs_mode):
+    env = make(env_id, obs_mode=obs_mode)
+    generator = np.random.default_rng(1)
+    for seed in range(5):
+        env.reset(seed=seed)
+        truncated, steps = False, 0
+        while not truncated:
+            observation, reward, _, truncated, info = env.step(generator.uniform(-0.3, 1, 1).astype(np.float32))
+            steps += 1
+            assert env.observation_space.contains(observation)
+            assert reward == pytest.approx(sum(info["reward_terms"].values()), abs=1e-12)
+            assert info["solver_status"] != Status.FAILED
+            assert info["cost"] >= 0
+        assert steps == 64
+
+
+@EVERY_ID
+def test_forces_vanish_without_contact_and_are_copies(env_id):
+    env = make(env_id)
+    _, info = env.reset(seed=0)
+    assert not info["force_true"].any()
+    assert not info["force_est"].any()
+    info["force_true"][:] = 7.0
+    *_, info = env.step(np.zeros(1, np.float32))
+    assert not info["force_true"].any()
+
+
+@EVERY_ID
+def test_a_steady_pull_reaches_every_set_point(env_id):
+    env = make(env_id)
+    for seed in range(30):
+        _, info = env.reset(seed=seed)
+        reached, truncated = 0.0, False
+        while reached < info["desired_force"] and not truncated:
+            *_, truncated, info = env.step(np.ones(1, np.float32))
+            reached = np.linalg.norm(info["force_true"])
+        assert reached >= info["desired_force"]
+
+
+@EVERY_ID
+def test_bad_actions_are_refused_and_change_nothing(env_id):
+    env = make(env_id).unwrapped
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        env.step(np.zeros(1))
+    env.reset(seed=0)
+    env.step(np.ones(1, np.float32))
+    before = env.equilibrium
+    for action in (np.array([np.nan]), np.zeros(2), np.array([[0.5]]), np.float32(0.5)):
+        with pytest.raises(ValueError, match="finite number in an array of shape"):
+            env.step(action)
+    assert env.equilibrium is before
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"obs_mode": "pixels"}, "obs_mode"),
+        ({"backend": "cuda"}, "backend"),
+        ({"cable_limit_mm": 1e3}, "at most 25"),
+        ({"max_increment_mm": -1.0}, "max_increment_mm"),
+        ({"force_limit": 0.0}, "force_limit"),
+        ({"render_mode": "ascii"}, "render_mode"),
+    ],
+)
+def test_bad_arguments_are_refused(kwargs, message):
+    with pytest.raises(ValueError, match=message):
+        PushObstacleEnv(**kwargs)
+
+
+def test_a_fixed_assignment_is_taken_as_given():
+    env = make("CCR/PushObstacle-v0")
+    scene = Scene([Circle(center=(44, 104), radius=15)])
+    observation, info = env.reset(options={"scene": scene, "desired_force": 0.05})
+    assert env.unwrapped.equilibrium.scene == scene
+    assert info["desired_force"] == 0.05
+    assert observation["desired_force"] == pytest.approx(0.05 / FORCE_SCALE_N)
+    with pytest.raises(ValueError, match="both"):
+        env.reset(options={"scene": scene})
+    with pytest.raises(ValueError, match="desired_force"):
+        env.reset(options={"scene": scene, "desired_force": -1.0})
+
+
+def test_arguments_are_json_able():
+    kwargs = json.loads(
+        json.dumps(
+            {
+                "task": {"radius_mm": [12.0, 13.0]},
+                "robot": {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0},
+                "weights": {"effort": 0.0},
+            }
+        )
+    )
+    env = make("CCR/PushObstacle-v0", **kwargs)
+    observation, _ = env.reset(seed=0)
+    assert observation["nodes"].shape == (39,)
+    assert 12 <= env.unwrapped.equilibrium.scene.obstacles[0].radius <= 13
+
+
+def test_an_impossible_task_says_so():
+    env = make("CCR/LoadCell-v0", task={"force_n": [50.0, 60.0]})
+    with pytest.raises(RuntimeError, match="widen"):
+        env.reset(seed=0)
+
+
+def test_without_the_force_sensor_only_the_estimate_is_seen():
+    env = make("CCR/PushObstacle-v0", force_sensor=False)
+    observation, _ = env.reset(seed=0)
+    assert "force_est" in observation
+    assert not {"force_measured", "force_error"} & observation.keys()
+
+
+def test_the_reference_backend_agrees():
+    native, reference = (make("CCR/PushObstacle-v0", backend=backend) for backend in ("native", "casadi"))
+    scene = Scene([Circle(center=(44, 104), radius=15)])
+    for env in (native, reference):
+        env.reset(options={"scene": scene, "desired_force": 0.05})
+    for _ in range(14):
+        *_, native_info = native.step(np.ones(1, np.float32))
+        *_, reference_info = reference.step(np.ones(1, np.float32))
+    assert native_info["force_true"].any()
+    assert reference_info["force_true"] == pytest.approx(native_info["force_true"], rel=1e-4)
+    assert reference_info["force_est"] == pytest.approx(native_info["force_est"], rel=1e-3)

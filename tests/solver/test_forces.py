@@ -1,0 +1,126 @@
+"""Forces against the virtual work they stand for, and against the paper's Table 1."""
+
+import math
+
+import numpy as np
+import pytest
+
+from solver import Circle, HalfPlane, Robot, Scene, Solver
+from solver.forces import (
+    Onset,
+    VirtualWork,
+    clearance,
+    force_true,
+    free_nodes,
+    free_tension,
+    tip_slopes,
+)
+from solver.formulation import node_derivatives
+
+SCENES = [
+    Scene([Circle(center=(44, 104), radius=15)]),
+    Scene([Circle(center=(33, 89), radius=12.5), Circle(center=(59, 140), radius=15)]),
+    Scene([HalfPlane(point=(31, 127), normal=(-1, 0), nodes=(14,))]),
+]
+EVERY_SCENE = pytest.mark.parametrize("scene", SCENES)
+
+
+def pulled(scene: Scene, cable_mm: float, step: float = 0.25):
+    solver = Solver(Robot.prototype(max_tension=math.inf), scene)
+    before, now, onset = solver.rest(), solver.rest(), Onset()
+    while now.cable_mm < cable_mm - 1e-9:
+        before, now = now, solver.step(now, min(now.cable_mm + step, cable_mm))
+        onset = onset.after(before, now)
+    return solver, now, onset
+
+
+@EVERY_SCENE
+def test_force_is_stiffness_times_multiplier(scene):
+    _, equilibrium, _ = pulled(scene, 9.0)
+    for force, multipliers in zip(force_true(equilibrium), equilibrium.multipliers, strict=True):
+        assert np.linalg.norm(force) <= equilibrium.robot.stiffness * multipliers.sum() * (1 + 1e-12)
+    assert np.linalg.norm(force_true(equilibrium).sum(axis=0)) > 0
+
+
+@EVERY_SCENE
+def test_work_of_tension_and_contact_is_the_change_of_energy(scene):
+    """B(∂J/∂q·q' + ∂J/∂l) = T + Σ F_j·x_j' for any admissible direction (q', 1), in node coordinates."""
+    _, equilibrium, _ = pulled(scene, 9.0)
+    robot, n = equilibrium.robot, equilibrium.robot.segments
+    parameters = [equilibrium.cable_mm, robot.length_mm, robot.offset_mm]
+    parameters += [value for obstacle in scene for value in obstacle.parameters]
+    unknowns = np.concatenate([equilibrium.nodes[1:, :2].ravel(), equilibrium.cable_nodes[1:].ravel()])
+    slope, _, equalities, _, gaps = (v.full() for v in node_derivatives(n, scene.kinds)(unknowns, parameters))
+    # Admissible: backbone and disks keep their lengths, cable segments shorten by 1/n each.
+    shortening = np.zeros(3 * n)
+    shortening[n : 2 * n] = -1.0 / n
+    null = np.linalg.svd(equalities)[2][3 * n :]
+    generator = np.random.default_rng(0)
+    for _ in range(10):
+        direction = np.linalg.lstsq(equalities, shortening, rcond=None)[0] + generator.normal(size=n) @ null
+        work = robot.stiffness * float(equilibrium.multipliers[:, :, 1:].ravel() @ (gaps @ direction))
+        change = robot.stiffness * float(slope.ravel() @ direction)
+        assert change == pytest.approx(equilibrium.tension + work, abs=1e-8)
+
+
+@EVERY_SCENE
+def test_tension_is_the_slope_of_the_energy_along_the_branch(scene):
+    solver, equilibrium, _ = pulled(scene, 9.1)
+    ahead, behind = (solver.step(equilibrium, equilibrium.cable_mm + h) for h in (1e-4, -1e-4))
+    slope = equilibrium.robot.stiffness * (ahead.objective - behind.objective) / 2e-4
+    assert slope == pytest.approx(equilibrium.tension, rel=1e-6)
+
+
+def test_free_robot_in_closed_form():
+    solver = Solver(Robot.prototype(), Scene())
+    for cable in (0.0, 0.5, 5.0, 12.0):
+        equilibrium = solver.step(solver.rest(), cable)
+        assert free_nodes(solver.robot, cable) == pytest.approx(equilibrium.nodes, abs=1e-11)
+        assert free_tension(solver.robot, cable) == pytest.approx(equilibrium.tension, abs=1e-12)
+    h = 1e-5
+    slopes = (free_nodes(solver.robot, 5 + h)[-1] - free_nodes(solver.robot, 5 - h)[-1]) / (2 * h)
+    assert tip_slopes(solver.robot, 5.0) == pytest.approx(slopes, rel=1e-7)
+
+
+def test_clearance_is_the_smallest_gap_of_the_free_robot():
+    for scene in SCENES:
+        rest = Solver(Robot.prototype(), scene).rest()
+        assert clearance(rest.robot, scene, 0.0) == pytest.approx(rest.gaps.min(), abs=1e-12)
+    assert clearance(Robot.prototype(), Scene(), 3.0) == math.inf
+
+
+def test_onset_does_not_depend_on_the_increment():
+    onsets = [pulled(SCENES[2], 6.0, step)[2].tension for step in (0.05, 0.25, 0.5)]
+    assert onsets == pytest.approx([onsets[0]] * 3, rel=1e-6)
+
+
+def test_onset_is_forgotten_when_contact_ends():
+    solver, equilibrium, onset = pulled(SCENES[0], 7.0)
+    assert onset.tension is not None
+    released = solver.step(equilibrium, 2.0)
+    assert onset.after(equilibrium, released) == Onset()
+    assert not VirtualWork().estimate(released, Onset()).any()
+    assert not force_true(released).any()
+
+
+def test_estimate_on_a_wall_is_equation_11():
+    _, equilibrium, onset = pulled(SCENES[2], 7.0)
+    x, y, turn = tip_slopes(equilibrium.robot, equilibrium.cable_mm)
+    load = equilibrium.tension - onset.tension
+    for friction in (0.0, 0.4):
+        horizontal = equilibrium.robot.offset_mm * load * turn / (friction * y + x)
+        force = VirtualWork(friction).estimate(equilibrium, onset)[0]
+        assert force == pytest.approx([horizontal, friction * horizontal])
+    assert horizontal < 0  # the wall pushes the robot back
+
+
+def test_table_1_theoretical_column_from_one_calibration_point():
+    """Paper, Table 1: μ from d = 31 mm, 250 g → 17.8 g, then the theoretical column within its rounding."""
+    robot = Robot.prototype()
+    slopes = tip_slopes(robot, 3.5)
+    estimator = VirtualWork.calibrated(17.8, 250.0, slopes, robot.offset_mm)
+    x, y, turn = slopes
+    column = [-robot.offset_mm * load * turn / (estimator.friction * y + x) for load in range(50, 351, 50)]
+    assert column == pytest.approx([3.5, 7.1, 10.7, 14.2, 17.8, 21.3, 24.9], abs=0.1)
+    with pytest.raises(ValueError, match="positive"):
+        VirtualWork.calibrated(0.0, 250.0, slopes, robot.offset_mm)
