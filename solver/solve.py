@@ -104,7 +104,9 @@ def check_command(robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm
         ValueError: Naming the value and the bound.
     """
     if not (math.isfinite(cable_mm) and 0 <= cable_mm <= robot.cable_limit_mm):
-        raise ValueError(f"cable_mm is {cable_mm}; it must be from 0 to {robot.cable_limit_mm:.6g} (robot.max_cable_mm)")
+        raise ValueError(
+            f"cable_mm is {cable_mm}; it must be from 0 to {robot.cable_limit_mm:.6g} (robot.max_cable_mm)"
+        )
     if equilibrium.robot is not robot and equilibrium.robot != robot:
         raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
     if equilibrium.scene is not scene and equilibrium.scene != scene:
