@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from ccr_gym.observation import FORCE_SCALE_N, Reading, dict_space, flat_space, flatten, observe
+from ccr_gym.observation import FORCE_SCALE_N, Observer, Reading
 from ccr_gym.rendering import Frame, Renderer
 from ccr_gym.reward import RewardWeights, reward_terms
 from ccr_gym.tasks import Assignment, Task, assign
@@ -83,9 +83,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self.backend = backend
         self.render_mode = render_mode
         self.estimator = VirtualWork(friction)
-        self._dict_space = dict_space(self.robot, force_sensor)
-        flat = obs_mode == "flat"
-        space: spaces.Space[Any] = flat_space(self._dict_space) if flat else self._dict_space
+        self._observer = Observer(self.robot, force_sensor)
+        space: spaces.Space[Any] = self._observer.flat_space if obs_mode == "flat" else self._observer.dict_space
         self.observation_space = space
         self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
         self._renderer: Renderer | None = None
@@ -187,12 +186,11 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
     def _measure(self) -> None:
         self._force_true = force_true(self._equilibrium).sum(axis=0)
         self._force_est = self.estimator.estimate(self._equilibrium, self._onset).sum(axis=0)
-        self._force_size = float(np.hypot(*self._force_true))
+        self._force_size = math.hypot(*self._force_true)
 
     def _observe(self) -> Observation:
         reading = Reading(self._equilibrium, self._force_true, self._force_est, self._desired, self.cable_limit_mm)
-        observation = observe(reading, self._dict_space)
-        return flatten(observation) if self.obs_mode == "flat" else observation
+        return self._observer.flat(reading) if self.obs_mode == "flat" else self._observer.entries(reading)
 
     def _info(self, terms: dict[str, float]) -> dict[str, Any]:
         return {

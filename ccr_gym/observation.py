@@ -1,5 +1,6 @@
 """The observation: what is seen, how it is scaled, and its flat form."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ class Reading(NamedTuple):
 
 
 def dict_space(robot: Robot, force_sensor: bool) -> spaces.Dict:
-    """The space of :func:`observe`; keys stand in the alphabetical order of the flat form."""
+    """The dictionary of what is seen; keys stand in the alphabetical order of the flat form."""
     nodes = robot.segments + 1
     entries: dict[str, spaces.Space[np.ndarray]] = {
         "cable": _box(0, (1,)),
@@ -44,35 +45,44 @@ def dict_space(robot: Robot, force_sensor: bool) -> spaces.Dict:
     return spaces.Dict({key: entry for key, entry in entries.items() if force_sensor or key not in SENSOR_KEYS})
 
 
-def flat_space(space: spaces.Dict) -> spaces.Box:
-    """One box with the entries of the dictionary in order."""
-    boxes = [box for box in space.values() if isinstance(box, spaces.Box)]
-    return spaces.Box(np.concatenate([box.low for box in boxes]), np.concatenate([box.high for box in boxes]))
+class Observer:
+    """Writes readings as scaled float32 vectors within the bounds of their space.
 
+    Args:
+        robot: The robot.
+        force_sensor: Whether the measured force is seen.
+    """
 
-def observe(reading: Reading, space: spaces.Dict) -> dict[str, np.ndarray]:
-    """Scaled float32 arrays within the bounds of :func:`dict_space`, views of one vector in the order of the keys."""
-    equilibrium = reading.equilibrium
-    length = equilibrium.robot.length_mm
-    error = reading.desired_force - np.hypot(*reading.force_measured)
-    values: dict[str, np.ndarray | tuple[float]] = {
-        "cable": (equilibrium.cable_mm / reading.cable_limit_mm,),
-        "contact": equilibrium.contact.any(axis=0).ravel(),
-        "desired_force": (reading.desired_force / FORCE_SCALE_N,),
-        "force_error": (error / FORCE_SCALE_N,),
-        "force_est": reading.force_est / FORCE_SCALE_N,
-        "force_measured": reading.force_measured / FORCE_SCALE_N,
-        "nodes": (equilibrium.nodes / (length, length, np.pi)).ravel(),
-    }
-    vector = np.concatenate([values[key] for key in space]).astype(np.float32)
-    np.clip(vector, -1.0, 1.0, out=vector)
-    ends = np.cumsum([len(values[key]) for key in space]).tolist()
-    return {key: vector[end - len(values[key]) : end] for key, end in zip(space, ends, strict=True)}
+    def __init__(self, robot: Robot, force_sensor: bool) -> None:
+        self.dict_space = dict_space(robot, force_sensor)
+        boxes = [box for box in self.dict_space.values() if isinstance(box, spaces.Box)]
+        low, high = (np.concatenate([getattr(box, end) for box in boxes]) for end in ("low", "high"))
+        self.flat_space = spaces.Box(low, high)
+        ends = np.cumsum([box.shape[0] for box in boxes]).tolist()
+        self._places = {
+            key: slice(end - box.shape[0], end) for key, box, end in zip(self.dict_space, boxes, ends, strict=True)
+        }
+        self._pose_scale = (robot.length_mm, robot.length_mm, np.pi)
+        self._force_sensor = force_sensor
 
+    def flat(self, reading: Reading) -> np.ndarray:
+        """The flat form, ``(k,)`` float32."""
+        equilibrium, at = reading.equilibrium, self._places
+        vector = np.empty(self.flat_space.shape, np.float32)
+        vector[at["cable"]] = equilibrium.cable_mm / reading.cable_limit_mm
+        vector[at["contact"]] = equilibrium.contact.any(axis=0).ravel()
+        vector[at["desired_force"]] = reading.desired_force / FORCE_SCALE_N
+        vector[at["force_est"]] = reading.force_est / FORCE_SCALE_N
+        vector[at["nodes"]] = (equilibrium.nodes / self._pose_scale).ravel()
+        if self._force_sensor:
+            vector[at["force_error"]] = (reading.desired_force - math.hypot(*reading.force_measured)) / FORCE_SCALE_N
+            vector[at["force_measured"]] = reading.force_measured / FORCE_SCALE_N
+        return np.clip(vector, self.flat_space.low, self.flat_space.high, out=vector)
 
-def flatten(observation: dict[str, np.ndarray]) -> np.ndarray:
-    """The entries in order as one float32 vector."""
-    return np.concatenate(list(observation.values()))
+    def entries(self, reading: Reading) -> dict[str, np.ndarray]:
+        """The dictionary form, views of one vector."""
+        vector = self.flat(reading)
+        return {key: vector[place] for key, place in self._places.items()}
 
 
 def _box(low: float, shape: tuple[int, ...]) -> spaces.Box:

@@ -1,6 +1,6 @@
 """The reward: named terms, then their weighted sum. Works on scalars and on arrays over environments alike."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -49,8 +49,8 @@ def reward_terms(
     terms = {
         "force_error": -np.minimum(error, 1.0),
         "accuracy": np.exp(-error / 0.05),
-        "overshoot": -np.clip(force / desired - 1.0, 0.0, 1.0),
-        "approach": -np.where(touching, 0.0, np.clip(clearance, 0.0, 100.0) / 100.0),
-        "effort": -np.square(action),
+        "overshoot": -np.minimum(np.maximum(force / desired - 1.0, 0.0), 1.0),
+        "approach": -np.minimum(np.maximum(clearance, 0.0), 100.0) / 100.0 * ~touching,
+        "effort": -action * action,
     }
-    return {field.name: getattr(weights, field.name) * terms[field.name] for field in fields(weights)}
+    return {name: getattr(weights, name) * term for name, term in terms.items()}

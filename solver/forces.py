@@ -38,11 +38,11 @@ class Onset:
         A contact that begins inside a step does so on the free robot; the tension there is that of the free robot at
         the cable displacement where it first touches.
         """
-        if not now.contact.any():
+        if not now.multipliers.any():
             return Onset()
         if self.tension is not None:
             return self
-        if before.contact.any():
+        if before.multipliers.any():
             return Onset(before.tension)
         return Onset(free_tension(now.robot, _first_touch(now.robot, now.scene, before.cable_mm, now.cable_mm)))
 
@@ -141,7 +141,7 @@ def _first_touch(robot: Robot, scene: Scene, clear: float, touching: float) -> f
     """Cable displacement where the free robot first touches, between a clear one and one in contact [mm]."""
     if clearance(robot, scene, touching) >= 0:
         return touching
-    for _ in range(30):
+    for _ in range(20):
         middle = (clear + touching) / 2
         clear, touching = (middle, touching) if clearance(robot, scene, middle) > 0 else (clear, middle)
     return touching
@@ -150,10 +150,13 @@ def _first_touch(robot: Robot, scene: Scene, clear: float, touching: float) -> f
 def _contacts(equilibrium: Equilibrium) -> list[tuple[int, float, np.ndarray]]:
     """(obstacle, multiplier, outward normal) of every contact."""
     multipliers = equilibrium.multipliers
+    found = multipliers.nonzero()
+    if not found[0].size:
+        return []
     points = (equilibrium.nodes, equilibrium.cable_nodes)
     return [
-        (obstacle, multipliers[obstacle, point, node], _normal(equilibrium, obstacle, points[point][node, :2]))
-        for obstacle, point, node in zip(*(index.tolist() for index in np.nonzero(multipliers)), strict=True)
+        (obstacle, float(multipliers[obstacle, point, node]), _normal(equilibrium, obstacle, points[point][node, :2]))
+        for obstacle, point, node in zip(*(index.tolist() for index in found), strict=True)
     ]
 
 
