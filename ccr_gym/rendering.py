@@ -78,8 +78,8 @@ class Layout:
 
     plate_mm: float = 30.0
     plate_thickness_mm: float = 3.0
-    hatch_mm: float = 6.0
-    horizon_mm: float = 400.0
+    hatch_mm: float = 8.0
+    horizon_mm: float = 300.0
     hatch: float = 1.0
     wall: float = 3.0
 
@@ -497,7 +497,8 @@ def draw_gauge_readings(
     heights = [LAYOUT.gauge_height * min(max(force / full_scale, 0.0), 1.0) for _, force, _ in readings]
     bottom = top + LAYOUT.gauge_height
     for index, (height, (_, _, color)) in enumerate(zip(heights[:-1], readings[:-1], strict=True)):
-        canvas.box(left + 3 + index * (bar + 4), bottom - height, bar, height, color)
+        if height > 0:
+            canvas.box(left + 3 + index * (bar + 4), bottom - height, bar, height, color)
     y, right = bottom - heights[-1], left + 2 * bar + 10
     canvas.box(left - 3, y - 1.5, right - left + 6, 3, readings[-1][2])
     canvas.polygon([(right + 2, y), (right + 11, y - 6), (right + 11, y + 6)], readings[-1][2])

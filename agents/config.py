@@ -1,0 +1,63 @@
+"""Settings of a training run."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class TrainConfig:
+    """Train PPO on an environment; the defaults solve CCR/PushObstacle-v0."""
+
+    run: Path = Path("runs/ppo")
+    """Folder for policy, configuration, normaliser and TensorBoard log."""
+    env_id: str = "CCR/PushObstacle-v0"
+    """Environment to train on."""
+    seed: int = 0
+    """Seed of the learner and of the training scenes; evaluation scenes start at another (see EvaluateConfig)."""
+    steps: int = 300_000
+    """Environment steps to train for."""
+    envs: int = 32
+    """Environments stepped side by side."""
+    rollout: int = 64
+    """Steps of each environment between updates."""
+    batch_size: int = 512
+    """Samples of one gradient step."""
+    epochs: int = 8
+    """Passes over a rollout."""
+    learning_rate: float = 1e-3
+    """Of Adam, decaying linearly to zero."""
+    gamma: float = 0.9
+    """Discount of rewards."""
+    gae_lambda: float = 0.9
+    """Decay of advantages."""
+    log_std_init: float = -0.5
+    """Logarithm of the first exploration noise."""
+    width: int = 64
+    """Units in each of the two hidden layers."""
+
+    def save(self, path: Path) -> None:
+        """Write as JSON."""
+        path.write_text(json.dumps(asdict(self) | {"run": str(self.run)}, indent=2) + "\n")
+
+    @classmethod
+    def load(cls, path: Path) -> "TrainConfig":
+        """Read what :meth:`save` wrote."""
+        values = json.loads(path.read_text())
+        return cls(**values | {"run": Path(values["run"])})
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluateConfig:
+    """Evaluate a trained policy beside the PI controller, on scenes it was never trained on."""
+
+    run: Path = Path("runs/ppo")
+    """Folder of the training run; results are written there too."""
+    episodes: int = 100
+    """Episodes for each policy, the same for all."""
+    seed: int = 1_000_000
+    """Seed of the first evaluation scene; far from those of training."""
+    video: bool = True
+    """Whether to render the first episodes to a video."""
+    video_episodes: int = 4
+    """Episodes in the video."""
