@@ -26,27 +26,28 @@ class Policy(Protocol):
 class ForceController:
     """Proportional-integral control of the contact force, after a search for contact at full speed.
 
+    The cable increment is the change of the controller's output (velocity form), so saturation winds nothing up.
+
     Attributes:
-        proportional: Action per newton of force error.
-        integral: Action per newton of force error and step.
+        proportional: Action per newton of change of the force error.
+        integral: Action per newton of force error.
     """
 
-    proportional: float = 14.0
-    integral: float = 1.0
+    proportional: float = 5.0
+    integral: float = 20.0
     name: str = "PI"
-    _sum: float = field(default=0.0, init=False)
+    _last: float | None = field(default=None, init=False)
 
     def reset(self) -> None:
-        """Empty the integrator."""
-        self._sum = 0.0
+        """Forget the last error."""
+        self._last = None
 
     def act(self, observation: Observation) -> np.ndarray:
-        """Pull until something touches, then control the force; the integrator rests while the action saturates."""
+        """Pull until something touches, then control the force."""
         if not observation["contact"].any():
-            self._sum = 0.0
+            self._last = None
             return np.ones(1, np.float32)
         error = float(observation["force_error"][0]) * FORCE_SCALE_N
-        wanted = self.proportional * error + self.integral * (self._sum + error)
-        if abs(wanted) < 1:
-            self._sum += error
-        return np.array([min(max(wanted, -1.0), 1.0)], np.float32)
+        change = 0.0 if self._last is None else error - self._last
+        self._last = error
+        return np.clip([self.proportional * change + self.integral * error], -1.0, 1.0).astype(np.float32)

@@ -1,0 +1,86 @@
+"""The ``ccr-gym`` command."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from agents.config import EvaluateConfig, TrainConfig
+
+if TYPE_CHECKING:
+    from agents.evaluate import Summary
+
+Command = (
+    Annotated[TrainConfig, tyro.conf.subcommand("train")] | Annotated[EvaluateConfig, tyro.conf.subcommand("evaluate")]
+)
+
+
+def train(config: TrainConfig) -> None:
+    """Train PPO on an environment; the defaults solve CCR/PushObstacle-v0."""
+    from agents import ppo
+
+    folder = ppo.train(config)
+    print(f"Trained for {config.steps} steps on {config.env_id}; saved to {folder}")
+
+
+def evaluate(config: EvaluateConfig) -> None:
+    """Evaluate a trained policy beside the PI controller, on scenes it was never trained on."""
+    from agents.evaluate import run_episodes, summarize
+    from agents.figures import draw_evaluation
+    from agents.policy import ForceController, Policy
+    from agents.ppo import PPOPolicy
+    from agents.video import record
+
+    try:
+        learned = PPOPolicy(config.run)
+    except FileNotFoundError as error:
+        raise SystemExit(str(error)) from error
+    env_id = learned.config.env_id
+    policies: tuple[Policy, ...] = (learned, ForceController())
+    episodes = {p.name: run_episodes(p, env_id, config.seed, config.episodes) for p in policies}
+    summaries = [summarize(name, played) for name, played in episodes.items()]
+    policies_report = [summary.as_dict() for summary in summaries]
+    report = {"env_id": env_id, "episodes": config.episodes, "seed": config.seed, "policies": policies_report}
+    (config.run / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n")
+    draw_evaluation(episodes, config.run / "evaluation.png")
+    if config.video:
+        record(learned, env_id, config.seed, config.video_episodes, config.run / "evaluation.mp4")
+    show(summaries, f"{env_id}, {config.episodes} unseen episodes", config.run)
+
+
+def show(summaries: "list[Summary]", title: str, folder: Path) -> None:
+    """Print the table and where the rest is."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title)
+    for heading in ("policy", "final error", "[mN]", "within 5 %", "settling step", "overshoot", "contact losses"):
+        table.add_column(heading, justify="left" if heading == "policy" else "right")
+    for row in summaries:
+        table.add_row(
+            row.policy,
+            f"{row.median_error:.2%}",
+            f"{row.median_error_mn:.2f}",
+            f"{row.success:.0%}",
+            f"{row.settling_steps:.0f}",
+            f"{row.peak_overshoot:.1%}",
+            f"{row.contact_losses:.2f}",
+        )
+    console = Console()
+    console.print(table)
+    console.print("Medians over the episodes; contact losses and the share within 5 % are means.")
+    console.print(f"Figure, video and all figures as JSON: {folder}/evaluation.png, .mp4, .json", soft_wrap=True)
+
+
+def main() -> None:
+    """Entry point."""
+    command: TrainConfig | EvaluateConfig = tyro.cli(Command, prog="ccr-gym")
+    if isinstance(command, TrainConfig):
+        train(command)
+    else:
+        evaluate(command)
+
+
+if __name__ == "__main__":
+    main()

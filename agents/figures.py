@@ -1,0 +1,78 @@
+"""Figures of an evaluation."""
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle as Disc
+
+from agents.evaluate import Episode
+from solver import Circle, Equilibrium
+
+TRUE, ESTIMATE, GOAL, BACKBONE, CABLE, OBSTACLE = "C0", "C1", "0.3", "#1f3a7a", "#a06a4a", "#c9d1de"
+COLUMNS = 4
+
+
+def draw_evaluation(episodes: dict[str, list[Episode]], path: Path) -> None:
+    """Force against set-point of each policy's first episodes, and the first policy's shape at four instants."""
+    rows = len(episodes) + 1
+    figure, axes = plt.subplots(rows, COLUMNS, figsize=(13, 3.1 * rows), layout="constrained")
+    for row, (name, played) in zip(axes, episodes.items(), strict=False):
+        for column, (axis, episode) in enumerate(zip(row, played, strict=False)):
+            draw_force(axis, episode)
+            axis.set_title(f"{name}, episode {column + 1}", fontsize=10)
+        row[0].set_ylabel("contact force [mN]")
+    axes[0, 0].legend(fontsize=8, loc="lower right")
+    episode = next(iter(episodes.values()))[0]
+    for axis, step in zip(axes[-1], instants(episode), strict=True):
+        draw_shape(axis, episode.equilibria[step])
+        axis.set_title(
+            f"step {step + 1}: {1e3 * episode.true[step]:.0f} of {1e3 * episode.desired:.0f} mN", fontsize=10
+        )
+    axes[-1, 0].set_ylabel("y [mm]")
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def instants(episode: Episode) -> list[int]:
+    """Four telling steps: on the way, the first touch, at half the set-point, the end."""
+    touch = int(np.argmax(episode.true > 0))
+    half = int(np.argmax(episode.true > episode.desired / 2))
+    return [touch // 2, touch, half, len(episode.true) - 1]
+
+
+def draw_force(axis: Axes, episode: Episode) -> None:
+    """True and estimated force over the steps of an episode."""
+    steps = np.arange(1, len(episode.true) + 1)
+    axis.axhspan(950 * episode.desired, 1050 * episode.desired, color=GOAL, alpha=0.15, lw=0)
+    axis.axhline(1e3 * episode.desired, color=GOAL, ls="--", lw=1, label="set-point ± 5 %")
+    axis.plot(steps, 1e3 * episode.estimated, color=ESTIMATE, lw=1, alpha=0.7, label="virtual-work estimate")
+    axis.plot(steps, 1e3 * episode.true, color=TRUE, lw=2, label="true")
+    axis.set_ylim(0, 2e3 * episode.desired)
+    axis.set_xlabel("step")
+    axis.grid(alpha=0.3)
+
+
+def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
+    """Backbone, cable, disks, obstacles and contacts."""
+    nodes, cable = equilibrium.nodes, equilibrium.cable_nodes
+    for obstacle in equilibrium.scene:
+        if isinstance(obstacle, Circle):
+            axis.add_patch(Disc(obstacle.center, obstacle.radius, facecolor=OBSTACLE, edgecolor="0.4"))
+        else:
+            axis.axline(
+                obstacle.point, (obstacle.point[0] - obstacle.normal[1], obstacle.point[1] + obstacle.normal[0])
+            )
+    for node, hole in zip(nodes, cable, strict=True):
+        axis.plot([node[0], hole[0]], [node[1], hole[1]], color="0.6", lw=1)
+    axis.plot(nodes[:, 0], nodes[:, 1], color=BACKBONE, lw=2.5)
+    axis.plot(cable[:, 0], cable[:, 1], color=CABLE, lw=1)
+    touched: np.ndarray = np.asarray(equilibrium.contact.any(axis=0))
+    for points, touching in zip((nodes[:, :2], cable), touched, strict=True):
+        axis.plot(*points[touching].T, "o", color="crimson", ms=6, mfc="none")
+    axis.set(aspect="equal", xlim=(-25, 125), ylim=(-5, 190), xlabel="x [mm]")
+    axis.grid(alpha=0.3)

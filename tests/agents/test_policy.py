@@ -1,0 +1,35 @@
+import numpy as np
+import pytest
+
+from agents.evaluate import run_episodes, summarize
+from agents.policy import ForceController
+from ccr_gym import ENV_IDS
+
+
+@pytest.mark.parametrize("env_id", sorted(ENV_IDS))
+def test_the_classical_controller_reaches_the_set_point(env_id):
+    summary = summarize("PI", run_episodes(ForceController(), env_id, seed=50, count=20))
+    assert summary.median_error < 0.01
+    assert summary.success >= 0.95
+    assert summary.contact_losses == 0
+
+
+def test_it_searches_until_something_touches_and_forgets():
+    controller = ForceController()
+    free = {"contact": np.zeros(38, np.float32), "force_error": np.array([0.2], np.float32)}
+    touching = {"contact": np.ones(38, np.float32), "force_error": np.array([0.02], np.float32)}
+    assert controller.act(free) == 1
+    first = controller.act(touching)
+    assert 0 < first < 1
+    assert controller.act({**touching, "force_error": np.array([0.04], np.float32)}) > 2 * first
+    controller.reset()
+    assert controller.act(touching) == first
+    assert controller.act({**touching, "force_error": np.array([-1.0], np.float32)}) == -1
+
+
+def test_the_same_episodes_give_the_same_numbers():
+    first, second = (run_episodes(ForceController(), "CCR/PushObstacle-v0", seed=9, count=2) for _ in range(2))
+    for a, b in zip(first, second, strict=True):
+        assert np.array_equal(a.true, b.true)
+        assert np.array_equal(a.estimated, b.estimated)
+        assert a.statuses == b.statuses
