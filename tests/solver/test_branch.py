@@ -1,0 +1,129 @@
+"""Where a branch ends: stall, jam, snap and pretension."""
+
+import math
+
+import numpy as np
+import pytest
+
+from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
+
+BLOCKING = ((32.4, 84.7, 14.9), (57.6, 148.6, 14.3))
+SLIPPERY = [
+    ((41.3, 105.7, 13.9), (68.9, 140.5, 12.1)),
+    ((50.3, 103.5, 11.7), (68.4, 145.9, 11.1)),
+    ((35.7, 90.7, 15.6), (60.6, 144.4, 12.9)),
+    ((37.7, 94.3, 11.0), (65.5, 149.7, 10.1)),
+]
+
+
+def certified(equilibrium):
+    residuals = equilibrium.residuals()
+    return max(residuals.stationarity, residuals.lengths, residuals.gaps, residuals.complementarity) <= 1e-8
+
+
+def walk(solver, equilibrium, cables):
+    for cable in cables:
+        equilibrium = solver.step(equilibrium, cable)
+        assert equilibrium.status is not Status.FAILED
+    return equilibrium
+
+
+def test_stall(circles, pulls):
+    robot = Robot.prototype()
+    solver = Solver(robot, circles(*BLOCKING))
+    equilibrium = solver.rest()
+    for cable in pulls(14.0, 0.25):
+        equilibrium = solver.step(equilibrium, cable)
+        assert equilibrium.tension <= robot.max_tension
+    assert equilibrium.status is Status.STALLED
+    assert equilibrium.tension == pytest.approx(robot.max_tension, rel=1e-5)
+    assert certified(equilibrium)
+
+    again = walk(solver, equilibrium, [14.0, 14.0])
+    assert again.status is Status.STALLED
+    assert again.cable_mm == equilibrium.cable_mm
+    assert np.array_equal(again.nodes, equilibrium.nodes)
+
+
+def test_release_from_a_stall(circles, pulls):
+    solver = Solver(Robot.prototype(), circles(*BLOCKING))
+    stalled = walk(solver, solver.rest(), pulls(14.0, 0.25))
+    released = walk(solver, stalled, np.arange(math.floor(stalled.cable_mm * 4), -1, -1) * 0.25)
+    assert released.status is Status.CONVERGED
+    assert released.cable_mm == 0
+    assert np.array_equal(released.nodes, solver.rest().nodes)
+
+
+def test_jam(circles, pulls):
+    solver = Solver(Robot.prototype(max_tension=math.inf), circles(*BLOCKING))
+    jammed = walk(solver, solver.rest(), pulls(14.0, 0.25))
+    assert jammed.status is Status.JAMMED
+    assert 12 < jammed.cable_mm < 13
+    assert certified(jammed)
+    released = walk(solver, jammed, [12.0])
+    assert released.status in (Status.CONVERGED, Status.SNAPPED)
+    assert released.cable_mm == 12.0
+    assert certified(released)
+
+
+@pytest.mark.parametrize("step", [0.25, 5.0])
+@pytest.mark.parametrize("pair", SLIPPERY)
+def test_snap(pair, step, circles, pulls, swept, clearance):
+    scene = circles(*pair)
+    robot = Robot.prototype(max_tension=math.inf)
+    solver = Solver(robot, scene)
+    equilibrium, statuses = solver.rest(), []
+    for cable in [*pulls(14.0, step), 14.0]:
+        shapes = solver.trace(equilibrium, cable)
+        equilibrium = solver.step(equilibrium, cable)
+        statuses.append(equilibrium.status)
+        assert np.array_equal(shapes[-1], equilibrium.nodes)
+        assert clearance(shapes, robot, scene).min() >= -1e-6
+        assert not swept(shapes, robot, scene).any()
+        assert np.linalg.norm(np.diff(shapes[..., :2], axis=0), axis=-1).max(initial=0) <= 0.5 + 16 * min(step, 0.5)
+        assert certified(equilibrium)
+    if step < 1:  # a large step that jams after its snap reports the jam
+        assert Status.SNAPPED in statuses
+
+
+def test_large_increments_do_not_sweep(random_scene, swept, clearance):
+    generator, robot = np.random.default_rng(7), Robot.prototype()
+    for _ in range(60):
+        scene = random_scene(generator)
+        solver = Solver(robot, scene)
+        equilibrium = solver.rest()
+        for change in generator.choice([-5.0, 5.0], 6, p=[0.3, 0.7]):
+            cable = float(np.clip(equilibrium.cable_mm + change, 0, 14))
+            shapes = solver.trace(equilibrium, cable)
+            equilibrium = solver.step(equilibrium, cable)
+            assert equilibrium.status is not Status.FAILED
+            assert clearance(shapes, robot, scene).min() >= -1e-6
+            assert not swept(shapes, robot, scene).any()
+
+
+def test_touching_robot_keeps_its_pretension():
+    solver = Solver(Robot.prototype(), Scene([HalfPlane(point=(8.001, 0), normal=(-1, 0))]))
+    pulled = walk(solver, solver.rest(), [0.5])
+    assert pulled.contact.any()
+    slack = walk(solver, pulled, [0.0])
+    assert slack.status is Status.CONVERGED
+    assert slack.cable_mm == pytest.approx(0.05, abs=1e-12)
+    assert walk(solver, slack, [0.5]).status is Status.CONVERGED
+
+
+def test_steps_are_pure(circles):
+    scene = circles(*BLOCKING)
+    solver, other = (Solver(Robot.prototype(), scene) for _ in range(2))
+    equilibrium = walk(solver, solver.rest(), [3.0, 6.0])
+    block = equilibrium.block.copy()
+    first = solver.step(equilibrium, 9.0)
+    walk(solver, solver.rest(), [12.0, 1.0])
+    assert np.array_equal(solver.step(equilibrium, 9.0).block, first.block)
+    assert np.array_equal(other.step(equilibrium, 9.0).block, first.block)
+    assert np.array_equal(equilibrium.block, block)
+
+
+def test_an_equilibrium_serves_equal_solvers():
+    scene = Scene([Circle(center=(33, 89), radius=12.5)])
+    equilibrium = Solver(Robot.prototype(), scene).rest()
+    assert Solver(Robot.prototype(), Scene(list(scene))).step(equilibrium, 2.0).status is Status.CONVERGED

@@ -1,0 +1,62 @@
+"""Every equilibrium is a KKT point of eq. 5, and the one the reference solver finds."""
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
+
+obstacles = st.builds(
+    lambda x, y, r: Circle(center=(x, y), radius=r), st.floats(35, 75), st.floats(75, 150), st.floats(10, 16)
+)
+scenes = st.lists(obstacles, min_size=1, max_size=3).map(Scene)
+increments = st.lists(st.floats(-0.2, 0.5), min_size=10, max_size=60)
+
+
+def follow(solver, changes):
+    equilibrium = solver.rest()
+    for change in changes:
+        equilibrium = solver.step(equilibrium, min(max(equilibrium.cable_mm + change, 0.0), 14.0))
+        yield equilibrium
+
+
+@settings(max_examples=60, deadline=None, derandomize=True, database=None)
+@given(scene=scenes, start=st.floats(1, 8), changes=increments)
+def test_residuals(scene, start, changes):
+    for equilibrium in follow(Solver(Robot.prototype(), scene), [start, *changes]):
+        residuals = equilibrium.residuals()
+        assert equilibrium.status is not Status.FAILED
+        assert residuals.stationarity <= 1e-8
+        assert residuals.lengths <= 1e-9
+        assert equilibrium.gaps.min() >= -1e-8
+        assert residuals.gaps <= 1e-8
+        assert residuals.sign == 0
+        assert residuals.complementarity <= 1e-10
+
+
+@settings(max_examples=8, deadline=None, derandomize=True, database=None)
+@given(scene=scenes, changes=st.lists(st.floats(0.1, 0.5), min_size=24, max_size=40))
+def test_reference_solver(scene, changes):
+    robot = Robot.prototype(max_tension=math.inf)
+    solver, reference = Solver(robot, scene), ReferenceSolver(robot, scene)
+    before = solver.step(solver.rest(), 1.0)
+    asked, answered = 0, 0
+    for change in changes:
+        after = solver.step(before, min(before.cable_mm + change, 14.0))
+        if after.status is Status.CONVERGED and after.cable_mm > before.cable_mm:
+            same = reference.step(before, after.cable_mm)
+            asked += 1
+            if same.status is Status.CONVERGED:
+                answered += 1
+                compare(after, same)
+        before = after
+    assert answered >= 0.9 * asked  # IPOPT gives up now and then; what it answers must agree
+
+
+def compare(ours, theirs):
+    np.testing.assert_allclose(ours.nodes, theirs.nodes, rtol=0, atol=1e-6)
+    ours_sum, theirs_sum = ours.multipliers.sum(axis=(1, 2)), theirs.multipliers.sum(axis=(1, 2))
+    np.testing.assert_allclose(ours_sum, theirs_sum, rtol=1e-5, atol=1e-11)
+    np.testing.assert_allclose(ours.tension, theirs.tension, rtol=1e-8)
