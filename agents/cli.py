@@ -4,7 +4,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
+try:
+    import tyro
+except ModuleNotFoundError as error:
+    raise SystemExit('the ccr-gym command needs its extra: pip install "ccr-gym[agents]"') from error
 
 from agents.config import EvaluateConfig, TrainConfig
 

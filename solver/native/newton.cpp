@@ -17,11 +17,11 @@ Newton::Newton(const Robot& robot, const std::vector<Obstacle>& obstacles)
   trial_.shear.resize(robot.segments);
 }
 
-bool Newton::equilibrium() const {
+bool Newton::equilibrium(const ActiveSet& active) const {
   double worst = 0;
   for (const Control& g : chain.gradient()) worst = std::max(worst, std::abs(g[0]));
   const double free = chain.free_angle();
-  return worst <= kStationarity * free * free + kRoundoff * chain.steepest() && feasible(kFeasibility);
+  return worst <= kStationarity * free * free + kRoundoff * chain.steepest() && on_surface(active, kFeasibility);
 }
 
 // Exact curvature where it is positive; else a penalty on the active gaps, which leaves the solution where it is.
@@ -102,7 +102,7 @@ Verdict Newton::solve(Iterate& at) {
   bool close = false;
   for (; verdict.iterations <= kNewtonIterations; ++verdict.iterations) {
     chain.reduced_gradient(at.active);
-    if (equilibrium()) {
+    if (equilibrium(at.active)) {
       verdict.converged = true;
       return verdict;
     }
@@ -161,7 +161,7 @@ double Newton::steepest_curvature() const {
 bool Newton::restore(Iterate& at) {
   if (!chain.evaluate(at.shear, at.cable)) return false;
   for (int attempt = 0; attempt < kRestorations; ++attempt) {
-    if (on_surface(at.active)) return true;
+    if (on_surface(at.active, kDescentFeasibility)) return true;
     ActiveSet held = at.active;
     std::fill_n(held.multiplier.begin(), held.count, kHeld);
     std::fill(penalty_.begin(), penalty_.end(), 0.0);
@@ -171,7 +171,7 @@ bool Newton::restore(Iterate& at) {
     advance(at, 1, correction_, at);
     if (!chain.evaluate(at.shear, at.cable)) return false;
   }
-  return on_surface(at.active);
+  return on_surface(at.active, kDescentFeasibility);
 }
 
 // Those of a set that touch: an open gap pushes nothing.
@@ -185,10 +185,11 @@ ActiveSet Newton::closed(const ActiveSet& active) const {
   return kept;
 }
 
-bool Newton::on_surface(const ActiveSet& active) const {
+// Whether every gap is met and the active ones are closed.
+bool Newton::on_surface(const ActiveSet& active, double tolerance) const {
   double farthest = chain.violation();
   for (int j = 0; j < active.count; ++j) farthest = std::max(farthest, chain.gaps()[active.contact[j]]);
-  return farthest <= kDescentFeasibility;
+  return farthest <= tolerance;
 }
 
 Verdict Newton::descend(Iterate& at, bool& moved) {
@@ -196,7 +197,7 @@ Verdict Newton::descend(Iterate& at, bool& moved) {
   moved = false;
   if (!chain.evaluate(at.shear, at.cable)) return verdict;
   chain.reduced_gradient(at.active);
-  verdict.converged = equilibrium() && convex(at.active, kPenalties);
+  verdict.converged = equilibrium(at.active) && convex(at.active, kPenalties);
   if (verdict.converged || !convexify(at.active)) return verdict;
   ActiveSet target = at.active;
   if (!model_step(target)) return verdict;

@@ -27,8 +27,8 @@ class Newton {
   // curvature along the active gaps is not positive.
   Verdict solve(Iterate& at);
 
-  // One feasible iterate of energy descent. `from` must be feasible. Returns the verdict on `from`, and where it is not
-  // yet an equilibrium moves `at` to a feasible shape of lower energy; `moved` tells whether it could.
+  // One iterate of energy descent from a feasible shape. Returns the verdict on that shape, and where it is not yet an
+  // equilibrium moves `at` to a feasible one of no more energy; `moved` tells whether it could.
   Verdict descend(Iterate& at, bool& moved);
 
   // Takes the curvature at `at` as the measure of motion for restore; false when it cannot be made positive.
@@ -39,10 +39,9 @@ class Newton {
   Chain chain;  // evaluated at the last iterate
 
  private:
-  bool equilibrium() const;
+  bool equilibrium(const ActiveSet& active) const;
   ActiveSet closed(const ActiveSet& active) const;
-  bool on_surface(const ActiveSet& active) const;
-  bool feasible(double tolerance) const { return chain.violation() <= tolerance; }
+  bool on_surface(const ActiveSet& active, double tolerance) const;
   bool convex(const ActiveSet& active, int penalties);
   bool convexify(const ActiveSet& active);
   void shape_system(const ActiveSet& active, double strength);

@@ -43,6 +43,20 @@ def test_checkers_pass_without_a_warning(env_id, obs_mode):
 
 
 @EVERY_ID
+def test_renders_to_an_array_and_to_a_window(env_id, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = make(env_id, render_mode="rgb_array")
+    env.reset(seed=0)
+    picture = env.render()
+    assert picture.shape == (640, 640, 3)
+    assert picture.dtype == np.uint8
+    window = make(env_id, render_mode="human")
+    window.reset(seed=0)
+    window.step(np.ones(1, np.float32))
+    window.close()
+
+
+@EVERY_ID
 def test_same_seed_same_bits(env_id):
     actions = np.random.default_rng(0).uniform(-0.5, 1, (64, 1)).astype(np.float32)
     first, second = (play(make(env_id, obs_mode="flat"), actions) for _ in range(2))
