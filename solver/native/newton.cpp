@@ -95,6 +95,30 @@ void blend(const ActiveSet& from, double scale, ActiveSet& to) {
 
 }  // namespace
 
+// Length of the step that lowers the l1 merit, with the chain evaluated there as `trial_`; 0 when there is none.
+// Close to the solution the curvature of the gaps makes the merit reject good steps: Newton is trusted there.
+double Newton::search(const Iterate& at, const ActiveSet& target, double& weight) {
+  if (cap(kDescentCap) == 1) {
+    advance(at, 1, step_, trial_);
+    if (chain.evaluate(trial_.shear, at.cable)) return 1;
+    return 0;
+  }
+  double slope = 0;  // of the objective along the step
+  for (std::size_t i = 0; i < step_.shear.size(); ++i) slope += chain.gradient()[i][0] * step_.shear[i][0];
+  for (int j = 0; j < at.active.count; ++j)
+    slope += at.active.multiplier[j] *
+             dot(chain.slope(at.active.contact[j]), step_.states[chain.node(at.active.contact[j])]);
+  for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
+  const double before = merit(weight);
+  const double expected = std::min(slope - (before - chain.objective()), 0.0);
+  double scale = cap(kNewtonCap);
+  for (int backtracks = 0; backtracks <= kBacktracks; ++backtracks, scale /= 2) {
+    advance(at, scale, step_, trial_);
+    if (chain.evaluate(trial_.shear, at.cable) && merit(weight) <= before + kArmijo * scale * expected) return scale;
+  }
+  return 0;
+}
+
 Verdict Newton::solve(Iterate& at) {
   Verdict verdict;
   if (!chain.evaluate(at.shear, at.cable)) return verdict;
@@ -119,25 +143,8 @@ Verdict Newton::solve(Iterate& at) {
     }
     if (!convex(at.active, kPenalties) || !model_step(target)) return verdict;
 
-    double slope = 0;  // of the objective along the step
-    for (std::size_t i = 0; i < step_.shear.size(); ++i) slope += chain.gradient()[i][0] * step_.shear[i][0];
-    for (int j = 0; j < at.active.count; ++j)
-      slope += at.active.multiplier[j] *
-               dot(chain.slope(at.active.contact[j]), step_.states[chain.node(at.active.contact[j])]);
-    for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
-    const double before = merit(weight);
-    const double expected = slope - (before - chain.objective());
-
-    double scale = cap(kNewtonCap);
-    int backtracks = 0;
-    for (;; scale /= 2, ++backtracks) {
-      if (backtracks > kBacktracks) return verdict;
-      advance(at, scale, step_, trial_);
-      if (!chain.evaluate(trial_.shear, at.cable)) continue;
-      // Close to the solution curvature of the gaps makes the merit reject good steps: trust Newton there.
-      if (scale == 1 && cap(kDescentCap) == 1) break;
-      if (merit(weight) <= before + kArmijo * scale * std::min(expected, 0.0)) break;
-    }
+    const double scale = search(at, target, weight);
+    if (scale == 0) return verdict;
     std::swap(at.shear, trial_.shear);
     blend(at.active, scale, target);
     at.active = target;

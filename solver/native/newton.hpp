@@ -49,6 +49,7 @@ class Newton {
   double steepest_curvature() const;
   double cap(double largest) const;
   double merit(double weight) const;
+  double search(const Iterate& at, const ActiveSet& target, double& weight);
 
   System system_;
   Contacts contacts_;
