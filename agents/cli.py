@@ -21,9 +21,14 @@ Command = (
 
 def train(config: TrainConfig) -> None:
     """Train PPO on an environment; the defaults solve CCR/PushObstacle-v0."""
+    from gymnasium.error import UnregisteredEnv
+
     from agents import ppo
 
-    folder = ppo.train(config)
+    try:
+        folder = ppo.train(config)
+    except UnregisteredEnv as error:
+        raise SystemExit(str(error)) from error
     print(f"Trained for {config.steps} steps on {config.env_id}; saved to {folder}")
 
 
@@ -37,7 +42,7 @@ def evaluate(config: EvaluateConfig) -> None:
 
     try:
         learned = PPOPolicy(config.run)
-    except FileNotFoundError as error:
+    except (FileNotFoundError, ValueError) as error:
         raise SystemExit(str(error)) from error
     env_id = learned.config.env_id
     policies: tuple[Policy, ...] = (learned, ForceController())
@@ -47,13 +52,15 @@ def evaluate(config: EvaluateConfig) -> None:
     report = {"env_id": env_id, "episodes": config.episodes, "seed": config.seed, "policies": policies_report}
     (config.run / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n")
     draw_evaluation(episodes, config.run / "evaluation.png")
+    video = config.run / "evaluation.mp4"
+    video.unlink(missing_ok=True)
     if config.video:
-        record(learned, env_id, config.seed, config.video_episodes, config.run / "evaluation.mp4")
-    show(summaries, f"{env_id}, {config.episodes} unseen episodes", config.run)
+        record(learned, env_id, config.seed, config.video_episodes, video)
+    show(summaries, f"{env_id}, {config.episodes} unseen episodes", sorted(config.run.glob("evaluation.*")))
 
 
-def show(summaries: "list[Summary]", title: str, folder: Path) -> None:
-    """Print the table and where the rest is."""
+def show(summaries: "list[Summary]", title: str, written: list[Path]) -> None:
+    """Print the table and what else was written."""
     from rich.console import Console
     from rich.table import Table
 
@@ -73,7 +80,7 @@ def show(summaries: "list[Summary]", title: str, folder: Path) -> None:
     console = Console()
     console.print(table)
     console.print("Medians over the episodes; contact losses and the share within 5 % are means.")
-    console.print(f"Figure, video and all figures as JSON: {folder}/evaluation.png, .mp4, .json", soft_wrap=True)
+    console.print("Written: " + ", ".join(map(str, written)), soft_wrap=True)
 
 
 def main() -> None:

@@ -4,6 +4,8 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+EVALUATION_SEED = 1_000_000  # training seeds stay below, evaluation seeds begin here
+
 
 @dataclass(frozen=True, slots=True)
 class TrainConfig:
@@ -14,7 +16,7 @@ class TrainConfig:
     env_id: str = "CCR/PushObstacle-v0"
     """Environment to train on."""
     seed: int = 0
-    """Seed of the learner and of the training scenes; evaluation scenes start at another (see EvaluateConfig)."""
+    """Seed of the learner and of the first environment's scenes; below 1 000 000, where evaluation begins."""
     steps: int = 300_000
     """Environment steps to train for."""
     envs: int = 32
@@ -36,15 +38,28 @@ class TrainConfig:
     width: int = 64
     """Units in each of the two hidden layers."""
 
+    def __post_init__(self) -> None:
+        if self.steps < 1:
+            raise ValueError(f"steps is {self.steps}; it must be at least 1")
+        if not 0 <= self.seed <= EVALUATION_SEED - self.envs:
+            raise ValueError(f"seed is {self.seed}; it must be from 0 to {EVALUATION_SEED - self.envs}")
+
     def save(self, path: Path) -> None:
         """Write as JSON."""
         path.write_text(json.dumps(asdict(self) | {"run": str(self.run)}, indent=2) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> "TrainConfig":
-        """Read what :meth:`save` wrote."""
-        values = json.loads(path.read_text())
-        return cls(**values | {"run": Path(values["run"])})
+        """Read what :meth:`save` wrote.
+
+        Raises:
+            ValueError: If it is something else.
+        """
+        try:
+            values = json.loads(path.read_text())
+            return cls(**values | {"run": Path(values["run"])})
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(f"{path} is not the configuration of a training run: {error!r}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +70,15 @@ class EvaluateConfig:
     """Folder of the training run; results are written there too."""
     episodes: int = 100
     """Episodes for each policy, the same for all."""
-    seed: int = 1_000_000
-    """Seed of the first evaluation scene; far from those of training."""
+    seed: int = EVALUATION_SEED
+    """Seed of the first evaluation scene; at least 1 000 000, beyond those of training."""
     video: bool = True
     """Whether to render the first episodes to a video."""
     video_episodes: int = 4
     """Episodes in the video."""
+
+    def __post_init__(self) -> None:
+        if self.episodes < 1:
+            raise ValueError(f"episodes is {self.episodes}; it must be at least 1")
+        if self.seed < EVALUATION_SEED:
+            raise ValueError(f"seed is {self.seed}; it must be at least {EVALUATION_SEED}, beyond the training seeds")

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle as Disc
 
 from agents.evaluate import Episode
-from solver import Circle, Equilibrium
+from ccr_gym.rendering import onto_surface, surface_axes
+from solver import Circle, Equilibrium, HalfPlane
 
 TRUE, ESTIMATE, GOAL, BACKBONE, CABLE, OBSTACLE = "C0", "C1", "0.3", "#1f3a7a", "#a06a4a", "#c9d1de"
 COLUMNS = 4
@@ -26,7 +27,7 @@ def draw_evaluation(episodes: dict[str, list[Episode]], path: Path) -> None:
             draw_force(axis, episode)
             axis.set_title(f"{name}, episode {column + 1}", fontsize=10)
         row[0].set_ylabel("contact force [mN]")
-    axes[0, 0].legend(fontsize=8, loc="lower right")
+    axes[0, 0].legend(fontsize=8, loc="best")
     episode = next(iter(episodes.values()))[0]
     for axis, step in zip(axes[-1], instants(episode), strict=True):
         draw_shape(axis, episode.equilibria[step])
@@ -50,9 +51,9 @@ def draw_force(axis: Axes, episode: Episode) -> None:
     steps = np.arange(1, len(episode.true) + 1)
     axis.axhspan(950 * episode.desired, 1050 * episode.desired, color=GOAL, alpha=0.15, lw=0)
     axis.axhline(1e3 * episode.desired, color=GOAL, ls="--", lw=1, label="set-point ± 5 %")
-    axis.plot(steps, 1e3 * episode.estimated, color=ESTIMATE, lw=1, alpha=0.7, label="virtual-work estimate")
+    axis.plot(steps, 1e3 * episode.estimated, color=ESTIMATE, lw=1, ls="--", alpha=0.7, label="virtual-work estimate")
     axis.plot(steps, 1e3 * episode.true, color=TRUE, lw=2, label="true")
-    axis.set_ylim(0, 2e3 * episode.desired)
+    axis.set_ylim(0, 1.1e3 * min(max(episode.estimated.max(), 1.3 * episode.desired), 4 * episode.desired))
     axis.set_xlabel("step")
     axis.grid(alpha=0.3)
 
@@ -64,9 +65,7 @@ def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
         if isinstance(obstacle, Circle):
             axis.add_patch(Disc(obstacle.center, obstacle.radius, facecolor=OBSTACLE, edgecolor="0.4"))
         else:
-            axis.axline(
-                obstacle.point, (obstacle.point[0] - obstacle.normal[1], obstacle.point[1] + obstacle.normal[0])
-            )
+            axis.plot(*_plate(obstacle, nodes[:, :2]).T, color="0.4", lw=4, solid_capstyle="butt")
     for node, hole in zip(nodes, cable, strict=True):
         axis.plot([node[0], hole[0]], [node[1], hole[1]], color="0.6", lw=1)
     axis.plot(nodes[:, 0], nodes[:, 1], color=BACKBONE, lw=2.5)
@@ -76,3 +75,11 @@ def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
         axis.plot(*points[touching].T, "o", color="crimson", ms=6, mfc="none")
     axis.set(aspect="equal", xlim=(-25, 125), ylim=(-5, 190), xlabel="x [mm]")
     axis.grid(alpha=0.3)
+
+
+def _plate(wall: HalfPlane, backbone: np.ndarray) -> np.ndarray:
+    """Ends of the part of a wall that is drawn, ``(2, 2)`` [mm]: a plate if only some nodes touch it, else all."""
+    half = 200.0 if wall.nodes is None else 15.0
+    touching = backbone[list(wall.nodes or range(len(backbone)))]
+    center = onto_surface(wall, touching.mean(axis=0))
+    return np.asarray(center + half * np.array([[-1.0], [1.0]]) * surface_axes(wall)[1])

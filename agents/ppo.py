@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecNormalize
 
 import ccr_gym  # noqa: F401 - registers the ids
@@ -31,7 +32,7 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
     model = PPO(
         "MlpPolicy",
         normalized,
-        learning_rate=lambda remaining: config.learning_rate * remaining,
+        learning_rate=LinearSchedule(config.learning_rate, 0.0, 1.0),
         n_steps=config.rollout,
         batch_size=config.batch_size,
         n_epochs=config.epochs,
@@ -49,7 +50,11 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
 
 
 def save(model: PPO, normalizer: VecNormalize, config: TrainConfig) -> None:
-    """Write policy, normaliser and configuration into the run folder, the configuration last."""
+    """Write policy, normaliser and configuration into the run folder.
+
+    The configuration goes first and comes last, so that a folder whose saving was interrupted does not load.
+    """
+    (config.run / CONFIG).unlink(missing_ok=True)
     model.save(config.run / POLICY)
     normalizer.save(str(config.run / NORMALIZER))
     config.save(config.run / CONFIG)
@@ -63,6 +68,7 @@ class PPOPolicy:
 
     Raises:
         FileNotFoundError: If a piece of the run is missing.
+        ValueError: If a piece cannot be read.
     """
 
     name = "PPO"

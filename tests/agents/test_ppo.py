@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from agents import cli, ppo
-from agents.config import TrainConfig
+from agents.config import EvaluateConfig, TrainConfig
 
 
 @pytest.fixture(scope="module")
@@ -60,3 +60,47 @@ def test_an_untrained_folder_is_refused_by_the_command(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["ccr-gym", "evaluate", "--run", str(tmp_path)])
     with pytest.raises(SystemExit, match="train first"):
         cli.main()
+
+
+def test_a_folder_whose_saving_was_interrupted_does_not_load(run, tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError("disk full")
+
+    for piece in (ppo.CONFIG, ppo.POLICY, ppo.NORMALIZER):
+        (tmp_path / piece).write_bytes((run / piece).read_bytes())
+    monkeypatch.setattr(ppo.VecNormalize, "save", fail)
+    with pytest.raises(OSError, match="disk full"):
+        ppo.train(TrainConfig(run=tmp_path, steps=64, envs=1, batch_size=64, epochs=1), progress=False)
+    with pytest.raises(FileNotFoundError, match=ppo.CONFIG):
+        ppo.PPOPolicy(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"steps": 3}', '{"run": "here", "stepz": 3}'])
+def test_a_foreign_configuration_is_refused(tmp_path, text):
+    (tmp_path / ppo.CONFIG).write_text(text)
+    with pytest.raises(ValueError, match="not the configuration"):
+        TrainConfig.load(tmp_path / ppo.CONFIG)
+
+
+def test_an_unknown_environment_is_refused_by_the_command(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", "train", "--run", str(tmp_path), "--env-id", "CCR/Nope-v0"])
+    with pytest.raises(SystemExit, match="Nope"):
+        cli.main()
+
+
+@pytest.mark.parametrize("arguments", [("train", "--steps", "0"), ("evaluate", "--episodes", "0"), ("train", "--help")])
+def test_the_command_line_exits_before_any_work(arguments, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(
+        sys, "argv", ["ccr-gym", *arguments, *(() if "--help" in arguments else ("--run", str(tmp_path)))]
+    )
+    with pytest.raises(SystemExit):
+        cli.main()
+    written = capsys.readouterr()
+    assert "at least 1" in written.out + written.err or "--steps INT" in written.out
+
+
+def test_training_and_evaluation_seeds_cannot_meet():
+    with pytest.raises(ValueError, match="seed is 999999"):
+        TrainConfig(seed=999_999)
+    with pytest.raises(ValueError, match="beyond the training seeds"):
+        EvaluateConfig(seed=999_999)
