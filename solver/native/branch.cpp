@@ -171,13 +171,13 @@ Branch::End Branch::pass_end(double increment) {
   const std::vector<Position> start_points = points_;
   const std::size_t start_trace = trace ? trace->size() : 0;
   settled_ = false;
-  const auto blocked = [&] {
+  const auto undo = [&](End reason) {
     present_ = start;
     points_ = start_points;
     if (trace) trace->resize(start_trace);
     settled_ = false;
     settle();
-    return End::kBlocked;
+    return reason;
   };
 
   trial_ = present_;
@@ -193,13 +193,13 @@ Branch::End Branch::pass_end(double increment) {
     }
     settled_ = false;
     settle();
-    if (increment > 0 && tension_ > newton_.chain.robot().max_tension) break;
+    if (increment > 0 && tension_ > newton_.chain.robot().max_tension) return undo(End::kOverTension);
     double farthest = 0;
     for (std::size_t k = 0; k < points_.size(); ++k)
       farthest = std::max(farthest, std::hypot(points_[k][0] - start_points[k][0], points_[k][1] - start_points[k][1]));
     return farthest > kMoveOffset ? End::kSnapped : End::kPassed;
   }
-  return blocked();
+  return undo(End::kBlocked);
 }
 
 bool Branch::at_limit() const { return tension_ >= newton_.chain.robot().max_tension * (1 - kTensionBand); }
@@ -230,6 +230,7 @@ Status Branch::follow(double target) {
     } else {
       const End end = pass_end(cable - present_.cable);
       if (end == End::kBlocked) return Status::kJammed;
+      if (end == End::kOverTension) return Status::kStalled;
       if (end == End::kSnapped) reached = Status::kSnapped;
       step = 2 * kSmallestStep;
       refined = false;

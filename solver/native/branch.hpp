@@ -26,12 +26,12 @@ class Branch {
   std::vector<double>* trace = nullptr;  // when set, receives (x, y, angle) of every node at every accepted shape
 
  private:
+  enum class Move { kAccepted, kRejected, kOverTension };
+  enum class End { kPassed, kSnapped, kBlocked, kOverTension };
+
   void load(const double* block);
   void store(double* block) const;
   Status follow(double target);
-  enum class Move { kAccepted, kRejected, kOverTension };
-  enum class End { kPassed, kSnapped, kBlocked };
-
   Move attempt(double cable);
   bool attempt_free(double cable);
   bool approach_limit();
