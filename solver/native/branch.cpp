@@ -95,7 +95,8 @@ bool Branch::passable(double allowed) const {
         const double dy = chain.points()[first + i][1] - points_[first + i][1];
         const double length = dx * dx + dy * dy;
         const double t = length > 0 ? std::clamp(-(px * dx + py * dy) / length, 0.0, 1.0) : 0.0;
-        if (std::hypot(px + t * dx, py + t * dy) < core) return false;
+        const double qx = px + t * dx, qy = py + t * dy;
+        if (qx * qx + qy * qy < core * core) return false;
       }
   }
   return true;

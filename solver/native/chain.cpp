@@ -122,13 +122,13 @@ void Chain::curvature(const ActiveSet& active, System& system) const {
     System::Stage& stage = system.stages[i];
     stage.a = {-bend.dy, bend.dx};
     stage.b = {{-bend.dy * heading, bend.dx * heading, -bend.slope}};
-    stage.hxx = {};
-    stage.hxx(2, 2) = inward;
+    system.node_hessian[i] = {};
+    system.node_hessian[i](2, 2) = inward;
     stage.hux = {{0, 0, inward * heading}};
     stage.huu = {{2 * (bend.slope * bend.slope + bend.angle * bend.curvature) + inward * heading * heading +
                   turn * bend.heading_curvature - p[2] * bend.curvature}};
   }
-  std::fill(system.node_hessian.begin(), system.node_hessian.end(), Mat<3, 3>{});
+  system.node_hessian[robot_.segments] = {};
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     const GapLaw law = gap_law(obstacle(contact), point(contact));

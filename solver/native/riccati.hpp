@@ -20,8 +20,7 @@ class Riccati {
   struct Stage {
     Transition a;
     Mat<NX, NU> b;
-    Mat<NX, NX> hxx;  // curvature of segment i in its own state and control
-    Mat<NU, NX> hux;
+    Mat<NU, NX> hux;  // curvature of segment i in its control, and in control and state
     Mat<NU, NU> huu;
   };
 
@@ -29,7 +28,7 @@ class Riccati {
       : stages(segments), node_hessian(segments + 1), gain_(segments), factor_(segments) {}
 
   std::vector<Stage> stages;
-  std::vector<Mat<NX, NX>> node_hessian;  // curvature added at each node
+  std::vector<Mat<NX, NX>> node_hessian;  // curvature in the state of each node
 
   // True exactly when the reduced Hessian (plus damping on the controls) is positive definite.
   bool factor(double damping) {
@@ -48,7 +47,6 @@ class Riccati {
       gain_[i] = qux;
       solve_factored(quu, gain_[i]);
       p = transpose_times(s.a, times(p, s.a));
-      p += s.hxx;
       p -= transpose_times(qux, gain_[i]);
     }
     return true;
