@@ -128,9 +128,7 @@ def main() -> None:
     print(f"contact mix: {len(times)} steps, 18 segments, {in_contact:.0%} in contact; {dict(statuses)}")
     quantiles = {name: float(np.percentile(times, q)) for name, q in (("median", 50), ("p95", 95), ("p99", 99))}
     print(f"  mean {times.mean():.2f} µs, " + ", ".join(f"{name} {value:.1f}" for name, value in quantiles.items()))
-    print(
-        f"  of which the call from Python takes {overhead:.2f} µs; inside the kernel: mean {times.mean() - overhead:.2f} µs"
-    )
+    print(f"  of it the call from Python {overhead:.2f} µs; inside the kernel: mean {times.mean() - overhead:.2f} µs")
 
     kernel, reference = reference_times(sample)
     ratio = float(np.median(reference / kernel))

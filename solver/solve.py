@@ -6,12 +6,13 @@ import numpy as np
 
 from solver._kernel import Kernel
 from solver.equilibrium import Equilibrium
+from solver.formulation import GAP_LAWS
 from solver.obstacles import Obstacle
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
 
-SHAPES = {"circle": 0, "half_plane": 1}  # order of ccr::Shape in native/chain.hpp
+SHAPES = {kind: index for index, kind in enumerate(GAP_LAWS)}  # as ccr::Shape in native/chain.hpp
 
 
 class Solver:
