@@ -9,13 +9,15 @@ try:
 except ModuleNotFoundError as error:
     raise SystemExit('the ccr-gym command needs its extra: pip install "ccr-gym[agents]"') from error
 
-from agents.config import EvaluateConfig, TrainConfig
+from agents.config import EvaluateConfig, ReproduceConfig, TrainConfig
 
 if TYPE_CHECKING:
     from agents.evaluate import Summary
 
 Command = (
-    Annotated[TrainConfig, tyro.conf.subcommand("train")] | Annotated[EvaluateConfig, tyro.conf.subcommand("evaluate")]
+    Annotated[TrainConfig, tyro.conf.subcommand("train")]
+    | Annotated[EvaluateConfig, tyro.conf.subcommand("evaluate")]
+    | Annotated[ReproduceConfig, tyro.conf.subcommand("reproduce")]
 )
 
 
@@ -83,13 +85,24 @@ def show(summaries: "list[Summary]", title: str, written: list[Path]) -> None:
     console.print("Written: " + ", ".join(map(str, written)), soft_wrap=True)
 
 
+def reproduce(config: ReproduceConfig) -> None:
+    """Regenerate the paper's planar figures and table, and check its claims in numbers."""
+    from agents.reproduce import reproduce as run
+
+    for claim in run(config.out):
+        print(f"{'holds' if claim.holds else 'DOES NOT HOLD'}: {claim.sentence}\n    {claim.found}")
+    print(f"Written: {config.out}/paper.json, {config.out}/paper.png")
+
+
 def main() -> None:
     """Entry point."""
-    command: TrainConfig | EvaluateConfig = tyro.cli(Command, prog="ccr-gym")
+    command: TrainConfig | EvaluateConfig | ReproduceConfig = tyro.cli(Command, prog="ccr-gym")
     if isinstance(command, TrainConfig):
         train(command)
-    else:
+    elif isinstance(command, EvaluateConfig):
         evaluate(command)
+    else:
+        reproduce(command)
 
 
 if __name__ == "__main__":

@@ -82,3 +82,11 @@ class EvaluateConfig:
             raise ValueError(f"episodes is {self.episodes}; it must be at least 1")
         if self.seed < EVALUATION_SEED:
             raise ValueError(f"seed is {self.seed}; it must be at least {EVALUATION_SEED}, beyond the training seeds")
+
+
+@dataclass(frozen=True, slots=True)
+class ReproduceConfig:
+    """Regenerate the paper's planar figures and table, and check its claims in numbers."""
+
+    out: Path = Path("runs/paper")
+    """Folder for paper.png and paper.json."""

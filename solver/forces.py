@@ -105,6 +105,19 @@ def tip_slopes(robot: Robot, cable_mm: float) -> np.ndarray:
     )
 
 
+def fitted_slopes(robot: Robot, low_mm: float, high_mm: float) -> np.ndarray:
+    """Slopes of straight lines fitted to the free tip pose over a range of cable displacement (Fig. 7), as above.
+
+    Raises:
+        ValueError: If the range is empty or outside the robot's.
+    """
+    if not 0 <= low_mm < high_mm <= robot.cable_limit_mm:
+        raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within 0 to {robot.cable_limit_mm:.6g} mm")
+    cables = np.linspace(low_mm, high_mm, 101)
+    tips = np.array([free_nodes(robot, cable)[-1] for cable in cables])
+    return np.asarray(np.polyfit(cables, tips, 1)[0])
+
+
 def free_angle(robot: Robot, cable_mm: float) -> float:
     """Angle between consecutive disks of the free robot, whose shear vanishes [rad]."""
     return float(2 * np.arcsin(cable_mm / (2 * robot.segments * robot.offset_mm)))

@@ -10,6 +10,7 @@ from solver.forces import (
     Onset,
     VirtualWork,
     clearance,
+    fitted_slopes,
     force_true,
     free_nodes,
     free_tension,
@@ -80,6 +81,15 @@ def test_free_robot_in_closed_form():
     h = 1e-5
     slopes = (free_nodes(solver.robot, 5 + h)[-1] - free_nodes(solver.robot, 5 - h)[-1]) / (2 * h)
     assert tip_slopes(solver.robot, 5.0) == pytest.approx(slopes, rel=1e-7)
+
+
+def test_fitted_slopes_lie_between_and_tend_to_the_exact_ones():
+    robot = Robot.prototype()
+    fitted, low, high = fitted_slopes(robot, 2.0, 6.0), tip_slopes(robot, 2.0), tip_slopes(robot, 6.0)
+    assert np.all((np.minimum(low, high) <= fitted) & (fitted <= np.maximum(low, high)))
+    assert fitted_slopes(robot, 3.999, 4.001) == pytest.approx(tip_slopes(robot, 4.0), rel=1e-6)
+    with pytest.raises(ValueError, match="range is 5 to 2"):
+        fitted_slopes(robot, 5, 2)
 
 
 def test_clearance_is_the_smallest_gap_of_the_free_robot():
