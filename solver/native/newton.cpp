@@ -212,6 +212,8 @@ Verdict Newton::descend(Iterate& at, bool& moved) {
   double scale = cap(kDescentCap);
   trial_.cable = at.cable;
   const ActiveSet touching = closed(target);
+  // Restorations are measured by closeness: near a fold the energy hardly resists the motion that ends the branch.
+  if (!system_.factor(damping_ + kMeasureDamping * steepest_curvature())) return verdict;
   for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= 2) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap that is to push
     advance(at, scale, step_, trial_);
