@@ -93,7 +93,7 @@ class VirtualWork:
 def tip_slopes(robot: Robot, cable_mm: float) -> np.ndarray:
     """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
     angle = free_angle(robot, cable_mm)
-    turn = 1 / np.sqrt((robot.segments * robot.offset_mm) ** 2 - cable_mm**2 / 4)  # dθ/dl
+    turn = _turn(robot, cable_mm)
     middles = np.arange(robot.segments) + 0.5
     along = robot.segment_mm * middles * turn
     return np.array(
@@ -136,9 +136,7 @@ def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
 
 def free_tension(robot: Robot, cable_mm: float) -> float:
     """Cable tension of the free robot, ``B dJ/dl`` [N]."""
-    angle = free_angle(robot, cable_mm)
-    turn = 1 / np.sqrt((robot.segments * robot.offset_mm) ** 2 - cable_mm**2 / 4)
-    return float(2 * robot.stiffness * robot.segments * angle * turn)
+    return 2 * robot.stiffness * robot.segments * free_angle(robot, cable_mm) * _turn(robot, cable_mm)
 
 
 def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
@@ -148,6 +146,11 @@ def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
     points = np.stack([nodes[:, :2], cable])
     gaps = [obstacle.gap(points)[:, obstacle.touchable(len(nodes))].min() for obstacle in scene]
     return float(min(gaps, default=np.inf))
+
+
+def _turn(robot: Robot, cable_mm: float) -> float:
+    """Slope of :func:`free_angle` in the cable displacement [rad/mm]."""
+    return float(1 / np.sqrt((robot.segments * robot.offset_mm) ** 2 - cable_mm**2 / 4))
 
 
 def _first_touch(robot: Robot, scene: Scene, clear: float, touching: float) -> float:
@@ -166,12 +169,8 @@ def _contacts(equilibrium: Equilibrium) -> list[tuple[int, float, np.ndarray]]:
     found = multipliers.nonzero()
     if not found[0].size:
         return []
-    points = (equilibrium.nodes, equilibrium.cable_nodes)
+    points, obstacles = (equilibrium.nodes, equilibrium.cable_nodes), equilibrium.scene.obstacles
     return [
-        (obstacle, float(multipliers[obstacle, point, node]), _normal(equilibrium, obstacle, points[point][node, :2]))
-        for obstacle, point, node in zip(*(index.tolist() for index in found), strict=True)
+        (j, float(multipliers[j, point, node]), obstacles[j].normal_at(points[point][node, :2]))
+        for j, point, node in zip(*(index.tolist() for index in found), strict=True)
     ]
-
-
-def _normal(equilibrium: Equilibrium, obstacle: int, point: np.ndarray) -> np.ndarray:
-    return equilibrium.scene.obstacles[obstacle].normal_at(point)

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from solver.equilibrium import Equilibrium
-from solver.formulation import gap_function, node_derivatives, node_problem
+from solver.formulation import node_derivatives, node_problem
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.solve import check_clear, check_command
@@ -83,7 +83,6 @@ class ReferenceSolver:
         self.scene = scene
         self._shapes = [value for obstacle in scene for value in obstacle.parameters]
         self._touchable = np.array([obstacle.touchable(robot.segments + 1) for obstacle in scene], dtype=bool)
-        self._gap_laws = [gap_function(kind) for kind in scene.kinds]
         self._build()
         self._rest = self._equilibrium(self._free(0.0), Status.CONVERGED, 0)
         check_clear(self._rest)
@@ -259,8 +258,6 @@ class ReferenceSolver:
 
     def _gaps(self, backbone: np.ndarray, cable: np.ndarray) -> np.ndarray:
         gaps = np.full((len(self.scene), 2, len(backbone)), np.inf)
-        for j, (law, obstacle) in enumerate(zip(self._gap_laws, self.scene, strict=True)):
-            for k, points in enumerate((backbone, cable)):
-                values = [float(law(point, obstacle.parameters)[0]) for point in points]
-                gaps[j, k] = np.where(self._touchable[j], values, np.inf)
+        for j, obstacle in enumerate(self.scene):
+            gaps[j][:, self._touchable[j]] = obstacle.gap(np.stack([backbone, cable]))[:, self._touchable[j]]
         return gaps

@@ -27,6 +27,9 @@ GapLaw gap_law(const Obstacle& obstacle, const Position& point) {
   return law;
 }
 
+// Moment of the adjoint about the lower node: a turn of the segment moves the next node by (-dy, dx).
+double moment(const State& adjoint, const Bend& bend) { return adjoint[1] * bend.dx - adjoint[0] * bend.dy; }
+
 }  // namespace
 
 Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
@@ -105,8 +108,7 @@ void Chain::reduced_gradient(const ActiveSet& active) {
     const Bend& bend = bends_[i];
     p -= pulls_[i + 1];
     adjoints_[i] = p;
-    // A turn of the segment moves the next node by (-dy, dx).
-    const double turn = p[1] * bend.dx - p[0] * bend.dy;
+    const double turn = moment(p, bend);
     gradient_[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
     p[2] += turn;
   }
@@ -116,7 +118,7 @@ void Chain::curvature(const ActiveSet& active, System& system) const {
   for (int i = 0; i < robot_.segments; ++i) {
     const Bend& bend = bends_[i];
     const State& p = adjoints_[i];
-    const double turn = p[1] * bend.dx - p[0] * bend.dy;
+    const double turn = moment(p, bend);
     const double inward = -(p[0] * bend.dx + p[1] * bend.dy);
     const double heading = bend.heading_slope;
     System::Stage& stage = system.stages[i];
@@ -146,7 +148,7 @@ double Chain::cable_slope() const {
   for (int i = 0; i < robot_.segments; ++i) {
     const Bend& bend = bends_[i];
     const State& p = adjoints_[i];
-    const double turn = p[1] * bend.dx - p[0] * bend.dy;
+    const double turn = moment(p, bend);
     slope += bend.pull_slope * (2 * bend.angle - turn / 2 - p[2]);
   }
   return slope / robot_.segments;

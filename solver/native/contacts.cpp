@@ -15,11 +15,19 @@ void Direction::add(double scale, const Direction& other) {
     for (int k = 0; k < 3; ++k) states[i][k] += scale * other.states[i][k];
 }
 
-Contacts::Contacts(int segments) : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments)), loads_(kMaxActive + 1) {}
+Contacts::Contacts(int segments)
+    : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments)), loads_(kMaxActive + 1) {}
 
 System::Load Contacts::load(const Chain& chain, int contact, int j) {
   slopes_[j] = chain.slope(contact);
   return {nullptr, chain.node(contact), slopes_[j], responses_[j].shear.data(), responses_[j].states.data()};
+}
+
+// What the penalty on the active gaps adds to a step while they are not closed.
+void Contacts::penalize(const Chain& chain, const std::vector<double>& penalty, const ActiveSet& active,
+                        Direction& step) const {
+  for (int j = 0; j < active.count; ++j)
+    if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
 }
 
 // Takes a contact out, with its slope and response; `responses` counts those in use.
@@ -167,8 +175,7 @@ bool Contacts::solve(const Chain& chain, System& system, const Control* slope, c
     std::fill(step.states.begin(), step.states.end(), State{});
   }
   system.respond(std::span(loads_).first(count));
-  for (int j = 0; j < active.count; ++j)
-    if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
+  penalize(chain, penalty, active, step);
   settle(chain, active, step);
   for (int change = 0; change < kActiveSetChanges; ++change) {
     const int contact = most_violated(chain, active, step);
@@ -182,8 +189,7 @@ bool Contacts::correct(const Chain& chain, System& system, const Control* slope,
                        ActiveSet& active, Direction& step) {
   const System::Load load{slope, 0, {}, step.shear.data(), step.states.data()};
   system.respond({&load, 1});
-  for (int j = 0; j < active.count; ++j)
-    if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
+  penalize(chain, penalty, active, step);
   if (!factor(chain, active)) return false;
   push(closing(chain, active, step), active, step);
   const auto end = active.multiplier.begin() + active.count;

@@ -39,6 +39,7 @@ class Contacts {
     return dot(slopes_[j], d.states[chain.node(contact)]);
   }
   System::Load load(const Chain& chain, int contact, int j);
+  void penalize(const Chain& chain, const std::vector<double>& penalty, const ActiveSet& active, Direction& step) const;
   void release(ActiveSet& active, int j, int responses);
   bool factor(const Chain& chain, const ActiveSet& active);
   void apply_inverse(int count, Column& x) const;

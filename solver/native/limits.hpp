@@ -1,10 +1,11 @@
-// Every tolerance and limit of the solver, named once. Lengths in mm, angles in rad.
+// Every tolerance and limit of the solver, named once. Lengths in mm; a shear change is one of the sine of its angle.
 #pragma once
 
 namespace ccr::limits {
 
 // A point is an equilibrium when its stationarity residual is below
-// kStationarity * (free segment angle)^2 + kRoundoff * (largest objective slope) and no gap is violated.
+// kStationarity * (free segment angle)^2 + kRoundoff * (largest objective slope), no gap is violated and the active
+// ones are closed.
 inline constexpr double kStationarity = 1e-9;
 inline constexpr double kRoundoff = 1e-13;
 inline constexpr double kFeasibility = 1e-10;
