@@ -8,11 +8,10 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle as Disc
 
 from agents.evaluate import Episode
 from ccr_gym.rendering import onto_surface, surface_axes
-from solver import Circle, Equilibrium, HalfPlane
+from solver import Equilibrium, HalfPlane
 
 TRUE, ESTIMATE, GOAL, BACKBONE, CABLE, OBSTACLE = "C0", "C1", "0.3", "#1f3a7a", "#a06a4a", "#c9d1de"
 COLUMNS = 4
@@ -62,8 +61,8 @@ def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
     """Backbone, cable, disks, obstacles and contacts."""
     nodes, cable = equilibrium.nodes, equilibrium.cable_nodes
     for obstacle in equilibrium.scene:
-        if isinstance(obstacle, Circle):
-            axis.add_patch(Disc(obstacle.center, obstacle.radius, facecolor=OBSTACLE, edgecolor="0.4"))
+        if not isinstance(obstacle, HalfPlane):
+            axis.fill(*obstacle.outline().T, facecolor=OBSTACLE, edgecolor="0.4")
         else:
             axis.plot(*_plate(obstacle, nodes[:, :2]).T, color="0.4", lw=4, solid_capstyle="butt")
     for node, hole in zip(nodes, cable, strict=True):

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import ArrayLike
 
-from solver import Circle, Equilibrium, HalfPlane, Status
+from solver import Circle, Equilibrium, HalfPlane, Obstacle, Status
 
 if TYPE_CHECKING:
     import pygame
@@ -297,6 +297,8 @@ def draw_world(canvas: Canvas, frame: Frame) -> None:
     for obstacle in equilibrium.scene:
         if isinstance(obstacle, Circle):
             draw_circle(canvas, obstacle)
+        elif not isinstance(obstacle, HalfPlane):
+            draw_solid(canvas, obstacle)
         elif obstacle.nodes is None:
             draw_wall(canvas, obstacle)
         else:
@@ -326,6 +328,13 @@ def draw_circle(canvas: Canvas, circle: Circle) -> None:
     center, radius = canvas.camera(circle.center), circle.radius * canvas.camera.scale
     canvas.disc(center, radius, PALETTE.outline)
     canvas.disc(center, radius - LAYOUT.outline, PALETTE.obstacle)
+
+
+def draw_solid(canvas: Canvas, obstacle: Obstacle) -> None:
+    """A filled outline."""
+    outline = canvas.camera(obstacle.outline())
+    canvas.polygon(outline, PALETTE.obstacle)
+    canvas.line(np.vstack([outline, outline[:1]]), LAYOUT.outline, PALETTE.outline)
 
 
 def draw_wall(canvas: Canvas, wall: HalfPlane) -> None:

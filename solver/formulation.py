@@ -11,10 +11,12 @@ Three layers, all in millimetre and radian:
 The first two are turned into C when the package is built (:mod:`solver.codegen`), with their derivatives.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 
 def segment_half_sine(sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
@@ -44,7 +46,71 @@ def half_plane_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
     return ca.dot(point, shape[:2]) - shape[2]
 
 
-GAP_LAWS = {"circle": circle_gap, "half_plane": half_plane_gap}
+def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to an ellipse ``shape = (x, y, a, b, ux, uy)`` with half-axis a along the unit vector u.
+
+    ``F / |∇F|`` of the implicit form ``F = (p·u / a)² + (p·v / b)² − 1``, both halved.
+    """
+    local = point - shape[:2]
+    along = (local[0] * shape[4] + local[1] * shape[5]) / shape[2]
+    across = (local[1] * shape[4] - local[0] * shape[5]) / shape[3]
+    steepness = ca.sqrt((along / shape[2]) ** 2 + (across / shape[3]) ** 2)
+    return (along**2 + across**2 - 1) / (2 * steepness)
+
+
+def capsule_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to a capsule ``shape = (x1, y1, x2, y2, r)``: that of the circle about the nearest point of its axis."""
+    axis = shape[2:4] - shape[:2]
+    fraction = ca.dot(point - shape[:2], axis) / ca.sumsqr(axis)
+    nearest = shape[:2] + ca.fmin(ca.fmax(fraction, 0), 1) * axis
+    return circle_gap(point, ca.vertcat(nearest, shape[4]))
+
+
+def polygon_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to a convex polygon with rounded corners ``shape = (r, x1, y1, …)``, its core's corners counter-clockwise.
+
+    The distance to the core less the corner radius: that of a half-plane beside an edge, of a point beyond a corner.
+    Corners may be repeated to fill the shape up.
+    """
+    corners = ca.reshape(shape[1:], 2, -1)
+    count = corners.shape[1]
+    edge, closest = ca.horzcat(corners[:, 0], corners[:, 1]), _square_distance(point, corners[:, 0], corners[:, 1])
+    for i in range(1, count):
+        start, end = corners[:, i], corners[:, (i + 1) % count]
+        distance = _square_distance(point, start, end)
+        edge = ca.if_else(distance < closest, ca.horzcat(start, end), edge)
+        closest = ca.fmin(distance, closest)
+    start, along = edge[:, 0], edge[:, 1] - edge[:, 0]
+    size = ca.sumsqr(along)
+    fraction = ca.dot(point - start, along) / ca.fmax(size, TINY)
+    beside = (along[1] * (point[0] - start[0]) - along[0] * (point[1] - start[1])) / ca.sqrt(ca.fmax(size, TINY))
+    corner = start + ca.if_else(fraction > 0.5, 1, 0) * along
+    beyond = ca.sqrt(ca.sumsqr(point - corner) + TINY)
+    return ca.if_else(ca.logic_and(fraction > 0, fraction < 1), beside, beyond) - shape[0]
+
+
+def _square_distance(point: ca.SX, start: ca.SX, end: ca.SX) -> ca.SX:
+    along = end - start
+    fraction = ca.dot(point - start, along) / ca.fmax(ca.sumsqr(along), TINY)
+    return ca.sumsqr(point - start - ca.fmin(ca.fmax(fraction, 0), 1) * along)
+
+
+class GapLaw(NamedTuple):
+    """One kind of obstacle: its gap as a function of (point, shape), and how many numbers its shape has."""
+
+    gap: Callable[[ca.SX, ca.SX], ca.SX]
+    size: int
+
+
+TINY = 1e-200  # keeps quotients defined where an edge has no length [mm²]
+POLYGON_CORNERS = 8
+GAP_LAWS = {
+    "circle": GapLaw(circle_gap, 3),
+    "half_plane": GapLaw(half_plane_gap, 3),
+    "ellipse": GapLaw(ellipse_gap, 6),
+    "capsule": GapLaw(capsule_gap, 5),
+    "polygon": GapLaw(polygon_gap, 1 + 2 * POLYGON_CORNERS),
+}
 
 
 def segment_function() -> ca.Function:
@@ -82,11 +148,12 @@ def segment_function() -> ca.Function:
 
 def gap_function(kind: str) -> ca.Function:
     """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle."""
-    point, shape = ca.SX.sym("point", 2), ca.SX.sym("shape", 3)
-    gap = GAP_LAWS[kind](point, shape)
+    law = GAP_LAWS[kind]
+    point, shape = ca.SX.sym("point", 2), ca.SX.sym("shape", law.size)
+    gap = law.gap(point, shape)
     hessian, gradient = ca.hessian(gap, point)
     outputs = ca.vertcat(gap, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1])
-    return ca.Function(f"ccr_{kind}_gap", [point, shape], [ca.densify(outputs)])
+    return ca.Function(f"ccr_{kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
 
 
 class NodeProblem(NamedTuple):
@@ -94,7 +161,7 @@ class NodeProblem(NamedTuple):
 
     Attributes:
         unknowns: Backbone then cable points of nodes 1…n, each as x, y pairs, ``(4n,)`` [mm].
-        parameters: ``(l, L0, a)`` then the shapes of the obstacles, ``(3 + 3m,)``.
+        parameters: ``(l, L0, a)`` then the shapes of the obstacles, one after the other.
         objective: Sum of squared disk angles [rad²].
         equalities: Backbone, cable and disk lengths of the segments minus their values, ``(3n,)`` [mm].
         gaps: Gap of every point of nodes 1…n to every obstacle, ordered (obstacle, point, node), ``(2nm,)`` [mm].
@@ -113,7 +180,9 @@ def node_problem(segments: int, kinds: tuple[str, ...]) -> NodeProblem:
     The arccosine of eq. 4 is written as an arctangent of the same disk directions, which is smooth at zero.
     """
     unknowns = ca.MX.sym("unknowns", 4 * segments)
-    parameters = ca.MX.sym("parameters", 3 + 3 * len(kinds))
+    sizes = [3, *(GAP_LAWS[kind].size for kind in kinds)]
+    parameters = ca.MX.sym("parameters", sum(sizes))
+    shapes = ca.vertsplit(parameters, np.cumsum([0, *sizes]).tolist())[1:]
     pull, total, offset = parameters[0], parameters[1], parameters[2]
     backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(unknowns[: 2 * segments], 2, segments))
     cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments :], 2, segments))
@@ -127,8 +196,8 @@ def node_problem(segments: int, kinds: tuple[str, ...]) -> NodeProblem:
         _norms(after) - offset,
     )
     gaps = [
-        _gaps(kind, points[:, 1:], parameters[3 + 3 * j : 6 + 3 * j])
-        for j, kind in enumerate(kinds)
+        _gaps(kind, points[:, 1:], shape)
+        for kind, shape in zip(kinds, shapes, strict=True)
         for points in (backbone, cable)
     ]
     return NodeProblem(unknowns, parameters, ca.sumsqr(angle), equalities.T, ca.vertcat(*gaps) if gaps else ca.MX(0, 1))

@@ -1,17 +1,103 @@
 """Obstacles of the plane, validated once."""
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from solver import _kernel
+from solver.formulation import GAP_LAWS, POLYGON_CORNERS
+
 Pair = tuple[float, float]
+
+SHAPES = {kind: index for index, kind in enumerate(GAP_LAWS)}  # as ccr::Shape in native/obstacle.hpp
+
+
+class Extent(NamedTuple):
+    """How large an obstacle is: a disc that holds it, and its finest feature.
+
+    Attributes:
+        center: Centre (x, y) of the disc [mm].
+        radius: Radius of the disc [mm]; infinite for a half-plane.
+        fineness: Smallest radius of curvature of the surface [mm]; infinite for a half-plane.
+    """
+
+    center: Pair
+    radius: float
+    fineness: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circle:
-    """A fixed disc.
+class Obstacle(ABC):
+    """A fixed, convex obstacle.
+
+    Attributes:
+        nodes: Node indices (base = 0) that can touch it; ``None`` for all.
+
+    Raises:
+        ValueError: If a node index is negative or repeated.
+    """
+
+    kind: ClassVar[str]
+
+    nodes: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.nodes is not None:
+            nodes = tuple(int(node) for node in self.nodes)
+            if not nodes or min(nodes) < 0 or len(set(nodes)) != len(nodes):
+                raise ValueError(f"nodes is {self.nodes}; it must name at least one node, each once, from 0")
+            object.__setattr__(self, "nodes", nodes)
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[float, ...]:
+        """Its shape as the gap law in :mod:`solver.formulation` takes it."""
+
+    @property
+    @abstractmethod
+    def extent(self) -> Extent:
+        """How large it is."""
+
+    @abstractmethod
+    def outline(self) -> np.ndarray:
+        """Points of its surface in order, ``(k, 2)`` [mm]: a closed polygon, or the surface point of a half-plane."""
+
+    def touchable(self, nodes: int) -> np.ndarray:
+        """Which of the nodes 0…n can touch it, ``(nodes,)`` bool.
+
+        Raises:
+            ValueError: If a named node does not exist.
+        """
+        if self.nodes is None:
+            return np.ones(nodes, dtype=bool)
+        if max(self.nodes) >= nodes:
+            raise ValueError(
+                f"{type(self).__name__} names node {max(self.nodes)}; the robot's nodes are 0 to {nodes - 1}"
+            )
+        return np.asarray(np.isin(np.arange(nodes), self.nodes))
+
+    def gap(self, points: np.ndarray) -> np.ndarray:
+        """Gaps of points ``(..., 2)`` [mm]; positive outside."""
+        return self._law(points)[..., 0]
+
+    def normal_at(self, point: np.ndarray) -> np.ndarray:
+        """Gradient of the gap at points ``(..., 2)``, the outward unit normal on the surface, ``(..., 2)``."""
+        return self._law(point)[..., 1:]
+
+    def _law(self, points: np.ndarray) -> np.ndarray:
+        points = np.ascontiguousarray(points, dtype=float)
+        gaps = np.empty((*points.shape[:-1], 3))
+        _kernel.measure_gaps(SHAPES[self.kind], np.array(self.parameters), points, gaps)
+        return gaps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle(Obstacle):
+    """A disc.
 
     Attributes:
         center: Its centre (x, y) [mm].
@@ -27,36 +113,32 @@ class Circle:
     radius: float
 
     def __post_init__(self) -> None:
+        Obstacle.__post_init__(self)
         object.__setattr__(self, "center", _pair("center", self.center))
-        if not (math.isfinite(self.radius) and self.radius > 0):
-            raise ValueError(f"radius is {self.radius}; it must be positive and finite")
+        _require_positive("radius", self.radius)
 
     @property
-    def parameters(self) -> tuple[float, float, float]:
-        """(x, y, r), as the gap law takes them."""
+    def parameters(self) -> tuple[float, ...]:
+        """(x, y, r)."""
         return (*self.center, self.radius)
 
-    def touchable(self, nodes: int) -> np.ndarray:
-        """Which of the nodes 0…n can touch it: all, ``(nodes,)`` bool."""
-        return np.ones(nodes, dtype=bool)
+    @property
+    def extent(self) -> Extent:
+        """The disc itself."""
+        return Extent(self.center, self.radius, self.radius)
 
-    def gap(self, points: np.ndarray) -> np.ndarray:
-        """Gaps of points ``(..., 2)`` [mm]; positive outside."""
-        return np.asarray((((points - self.center) ** 2).sum(-1) - self.radius**2) / (2 * self.radius))
-
-    def normal_at(self, point: np.ndarray) -> np.ndarray:
-        """Gradient of the gap at a point, the outward unit normal on the surface, ``(2,)``."""
-        return (point - self.center) / self.radius
+    def outline(self) -> np.ndarray:
+        """Points of the circle, ``(k, 2)`` [mm]."""
+        return np.array(self.center) + self.radius * _directions()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HalfPlane:
+class HalfPlane(Obstacle):
     """A flat wall, or with ``nodes`` the paper's load cell (eq. 12), which only the named nodes meet.
 
     Attributes:
         point: A point (x, y) of its surface [mm].
         normal: Outward normal, from the wall towards the robot; normalised on construction.
-        nodes: Node indices (base = 0) that can touch it; ``None`` for all.
 
     Raises:
         ValueError: If a value is not finite, the normal vanishes, or a node index is negative or repeated.
@@ -66,51 +148,162 @@ class HalfPlane:
 
     point: Pair
     normal: Pair
-    nodes: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
+        Obstacle.__post_init__(self)
         object.__setattr__(self, "point", _pair("point", self.point))
-        x, y = _pair("normal", self.normal)
-        size = math.hypot(x, y)
-        if size == 0:
-            raise ValueError("normal is (0, 0); give the direction from the wall towards the robot")
-        object.__setattr__(self, "normal", (x / size, y / size))
-        if self.nodes is not None:
-            nodes = tuple(int(node) for node in self.nodes)
-            if not nodes or min(nodes) < 0 or len(set(nodes)) != len(nodes):
-                raise ValueError(f"nodes is {self.nodes}; it must name at least one node, each once, from 0")
-            object.__setattr__(self, "nodes", nodes)
+        object.__setattr__(self, "normal", _unit("normal", self.normal, "from the wall towards the robot"))
 
     @property
-    def parameters(self) -> tuple[float, float, float]:
-        """(nx, ny, offset), as the gap law takes them."""
+    def parameters(self) -> tuple[float, ...]:
+        """(nx, ny, offset)."""
         return (*self.normal, self.normal[0] * self.point[0] + self.normal[1] * self.point[1])
 
-    def touchable(self, nodes: int) -> np.ndarray:
-        """Which of the nodes 0…n can touch it, ``(nodes,)`` bool.
+    @property
+    def extent(self) -> Extent:
+        """Without bounds, and flat."""
+        return Extent(self.point, math.inf, math.inf)
 
-        Raises:
-            ValueError: If a named node does not exist.
-        """
-        if self.nodes is None:
-            return np.ones(nodes, dtype=bool)
-        if max(self.nodes) >= nodes:
-            raise ValueError(f"HalfPlane names node {max(self.nodes)}; the robot's nodes are 0 to {nodes - 1}")
-        return np.asarray(np.isin(np.arange(nodes), self.nodes))
-
-    def gap(self, points: np.ndarray) -> np.ndarray:
-        """Gaps of points ``(..., 2)`` [mm]; positive outside."""
-        return np.asarray(points @ np.array(self.normal) - self.parameters[2])
-
-    def normal_at(self, point: np.ndarray) -> np.ndarray:
-        """Outward unit normal, the same everywhere, ``(2,)``."""
-        return np.array(self.normal)
+    def outline(self) -> np.ndarray:
+        """The point of the surface, ``(1, 2)`` [mm]."""
+        return np.array([self.point])
 
 
-Obstacle = Circle | HalfPlane
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ellipse(Obstacle):
+    """An ellipse.
+
+    Attributes:
+        center: Its centre (x, y) [mm].
+        radii: Its half-axes, along ``axis`` and across it [mm].
+        axis: Direction of the first half-axis; normalised on construction.
+
+    Raises:
+        ValueError: If a value is not finite, a half-axis not positive, or the axis vanishes.
+    """
+
+    kind: ClassVar[str] = "ellipse"
+
+    center: Pair
+    radii: Pair
+    axis: Pair = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        Obstacle.__post_init__(self)
+        object.__setattr__(self, "center", _pair("center", self.center))
+        object.__setattr__(self, "radii", _pair("radii", self.radii))
+        object.__setattr__(self, "axis", _unit("axis", self.axis, "of the first half-axis"))
+        for radius in self.radii:
+            _require_positive("a half-axis of radii", radius)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(x, y, a, b, ux, uy)."""
+        return (*self.center, *self.radii, *self.axis)
+
+    @property
+    def extent(self) -> Extent:
+        """The disc of the larger half-axis, and the curvature at its end."""
+        return Extent(self.center, max(self.radii), min(self.radii) ** 2 / max(self.radii))
+
+    def outline(self) -> np.ndarray:
+        """Points of the ellipse, ``(k, 2)`` [mm]."""
+        x, y = self.axis
+        return np.asarray(self.center + _directions() * self.radii @ np.array([[x, y], [-y, x]]))
 
 
-def _pair(name: str, value: Pair) -> Pair:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capsule(Obstacle):
+    """All points within a radius of a line: a rod, a rounded bar.
+
+    Attributes:
+        start: One end (x, y) of the line [mm].
+        end: Its other end [mm].
+        radius: The radius [mm].
+
+    Raises:
+        ValueError: If a value is not finite, the radius is not positive, or the ends coincide.
+    """
+
+    kind: ClassVar[str] = "capsule"
+
+    start: Pair
+    end: Pair
+    radius: float
+
+    def __post_init__(self) -> None:
+        Obstacle.__post_init__(self)
+        object.__setattr__(self, "start", _pair("start", self.start))
+        object.__setattr__(self, "end", _pair("end", self.end))
+        _require_positive("radius", self.radius)
+        if self.start == self.end:
+            raise ValueError(f"start and end are both {self.start}; they must differ (a Circle has one centre)")
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(x1, y1, x2, y2, r)."""
+        return (*self.start, *self.end, self.radius)
+
+    @property
+    def extent(self) -> Extent:
+        """The disc about the middle of the line."""
+        middle = ((self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2)
+        return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, self.radius)
+
+    def outline(self) -> np.ndarray:
+        """Points of its surface, ``(k, 2)`` [mm]."""
+        return _rounded(np.array([self.start, self.end]), self.radius)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polygon(Obstacle):
+    """A convex polygon with rounded corners: all points within a radius of its core.
+
+    Attributes:
+        corners: Corners (x, y) of the core, 3 to 8, in either sense [mm]; kept counter-clockwise.
+        radius: Radius of the corners, which also lies around the edges [mm].
+
+    Raises:
+        ValueError: If a value is not finite, the radius not positive, or the corners are too few, too many or not
+            those of a convex polygon.
+    """
+
+    kind: ClassVar[str] = "polygon"
+
+    corners: tuple[Pair, ...]
+    radius: float
+
+    def __post_init__(self) -> None:
+        Obstacle.__post_init__(self)
+        corners = tuple(_pair("a corner", corner) for corner in self.corners)
+        if not 3 <= len(corners) <= POLYGON_CORNERS:
+            raise ValueError(f"corners has {len(corners)} points; it must have 3 to {POLYGON_CORNERS}")
+        turns = _turns(corners)
+        if all(turn < 0 for turn in turns):
+            corners, turns = corners[::-1], [-turn for turn in turns]
+        if not (all(turn > 0 for turn in turns) and sum(turns) < 3 * math.pi):
+            raise ValueError(f"corners is {self.corners}; they must go once round a convex polygon, none straight")
+        object.__setattr__(self, "corners", corners)
+        _require_positive("radius", self.radius)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(r, x1, y1, …), the last corner repeated to fill up."""
+        filled = self.corners + (POLYGON_CORNERS - len(self.corners)) * self.corners[-1:]
+        return (self.radius, *(value for corner in filled for value in corner))
+
+    @property
+    def extent(self) -> Extent:
+        """The disc about the mean of the corners."""
+        x, y = np.mean(self.corners, axis=0).tolist()
+        return Extent((x, y), max(math.dist((x, y), c) for c in self.corners) + self.radius, self.radius)
+
+    def outline(self) -> np.ndarray:
+        """Points of its surface, ``(k, 2)`` [mm]."""
+        return _rounded(np.array(self.corners), self.radius)
+
+
+def _pair(name: str, value: Iterable[float]) -> Pair:
     try:
         x, y = (float(v) for v in value)
     except (TypeError, ValueError) as error:
@@ -118,3 +311,34 @@ def _pair(name: str, value: Pair) -> Pair:
     if not (math.isfinite(x) and math.isfinite(y)):
         raise ValueError(f"{name} is {value}; it must be finite")
     return x, y
+
+
+def _unit(name: str, value: Iterable[float], meaning: str) -> Pair:
+    x, y = _pair(name, value)
+    size = math.hypot(x, y)
+    if size == 0:
+        raise ValueError(f"{name} is (0, 0); give the direction {meaning}")
+    return x / size, y / size
+
+
+def _require_positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{name} is {value}; it must be positive and finite")
+
+
+def _turns(corners: tuple[Pair, ...]) -> list[float]:
+    """Angle turned at each corner, counter-clockwise positive [rad]."""
+    edges = np.roll(corners, -1, axis=0) - np.asarray(corners)
+    headings = np.arctan2(edges[:, 1], edges[:, 0])
+    return list(np.remainder(headings - np.roll(headings, 1) + np.pi, 2 * np.pi) - np.pi)
+
+
+def _directions() -> np.ndarray:
+    angles = np.linspace(0, 2 * np.pi, 97)[:-1]
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _rounded(core: np.ndarray, radius: float) -> np.ndarray:
+    """Outline of everything within a radius of the polygon or line through some points, ``(k, 2)``."""
+    directions = _directions()
+    return np.asarray(core[(directions @ core.T).argmax(axis=1)] + radius * directions)

@@ -4,15 +4,12 @@ import math
 
 import numpy as np
 
-from solver._kernel import Kernel
+from solver._kernel import SHAPE_SIZE, Kernel
 from solver.equilibrium import Equilibrium
-from solver.formulation import GAP_LAWS
-from solver.obstacles import Obstacle
+from solver.obstacles import SHAPES, Obstacle
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
-
-SHAPES = {kind: index for index, kind in enumerate(GAP_LAWS)}  # as ccr::Shape in native/chain.hpp
 
 
 class Solver:
@@ -34,6 +31,7 @@ class Solver:
         self.scene = scene
         nodes = robot.segments + 1
         touchable = np.array([obstacle.touchable(nodes) for obstacle in scene], dtype=bool).reshape(len(scene), nodes)
+        extents = [obstacle.extent for obstacle in scene]
         self._kernel = Kernel(
             robot.segments,
             robot.segment_mm,
@@ -41,7 +39,8 @@ class Solver:
             robot.stiffness,
             robot.max_tension,
             [SHAPES[kind] for kind in scene.kinds],
-            np.array([obstacle.parameters for obstacle in scene], dtype=float).reshape(len(scene), 3),
+            np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
+            np.array([(*center, radius, fineness) for center, radius, fineness in extents], dtype=float),
             touchable,
         )
         self._rest = self._follow(np.zeros(self._kernel.block_size), 0.0)
@@ -114,5 +113,9 @@ def check_command(robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm
         raise ValueError("the equilibrium is of another scene; step from rest() of this solver")
 
 
+def _filled(values: tuple[float, ...], size: int) -> tuple[float, ...]:
+    return values + (size - len(values)) * (0.0,)
+
+
 def _name(obstacle: Obstacle) -> str:
-    return f"{type(obstacle).__name__}{obstacle.parameters}"
+    return repr(obstacle)

@@ -19,24 +19,45 @@ using Output = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
 using Mask = nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Kinds = std::vector<int>;
 
-std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& parameters, const Mask& touchable) {
-  if (parameters.size() != 3 * kinds.size() || touchable.shape(0) != kinds.size())
-    throw std::invalid_argument("one row of parameters and of touchable nodes per obstacle");
-  std::vector<ccr::Obstacle> obstacles;
-  const std::size_t nodes = touchable.shape(1);
-  for (std::size_t i = 0; i < kinds.size(); ++i) {
-    const double* p = parameters.data() + 3 * i;
-    const bool* t = touchable.data() + nodes * i;
-    obstacles.push_back({static_cast<ccr::Shape>(kinds[i]), {p[0], p[1], p[2]}, {t, t + nodes}});
+std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& parameters, const Input& extents,
+                                          const Mask& touchable) {
+  const std::size_t count = kinds.size(), nodes = touchable.shape(1);
+  if (parameters.size() != ccr::kShapeSize * count || extents.size() != 4 * count || touchable.shape(0) != count)
+    throw std::invalid_argument("one row of parameters, extents and touchable nodes per obstacle");
+  std::vector<ccr::Obstacle> obstacles(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    ccr::Obstacle& obstacle = obstacles[i];
+    const double* extent = extents.data() + 4 * i;
+    obstacle.shape = static_cast<ccr::Shape>(kinds[i]);
+    std::copy_n(parameters.data() + ccr::kShapeSize * i, ccr::kShapeSize, obstacle.parameters.begin());
+    obstacle.center = {{extent[0], extent[1]}};
+    obstacle.radius = extent[2];
+    obstacle.fineness = extent[3];
+    obstacle.touchable.assign(touchable.data() + nodes * i, touchable.data() + nodes * (i + 1));
   }
   return obstacles;
+}
+
+// Gaps of points (k, 2) to one obstacle and their slopes: value, x, y of each.
+void measure_gaps(int kind, const Input& parameters, const Input& points, const Output& gaps) {
+  if (parameters.size() > ccr::kShapeSize || points.size() % 2 || 2 * gaps.size() != 3 * points.size())
+    throw std::invalid_argument("points (k, 2) give gaps (k, 3)");
+  ccr::Obstacle obstacle{};
+  obstacle.shape = static_cast<ccr::Shape>(kind);
+  std::copy_n(parameters.data(), parameters.size(), obstacle.parameters.begin());
+  for (std::size_t k = 0; k < points.size() / 2; ++k) {
+    const ccr::Gap gap = ccr::measure_gap(obstacle, {{points.data()[2 * k], points.data()[2 * k + 1]}});
+    const double values[] = {gap.value, gap.x, gap.y};
+    std::copy_n(values, 3, gaps.data() + 3 * k);
+  }
 }
 
 class Kernel {
  public:
   Kernel(int segments, double length, double offset, double stiffness, double max_tension, const Kinds& kinds,
-         const Input& parameters, const Mask& touchable)
-      : branch_({segments, length, offset, stiffness, max_tension}, read_obstacles(kinds, parameters, touchable)) {}
+         const Input& parameters, const Input& extents, const Mask& touchable)
+      : branch_({segments, length, offset, stiffness, max_tension},
+                read_obstacles(kinds, parameters, extents, touchable)) {}
 
   std::size_t block_size() const { return branch_.block_size(); }
 
@@ -68,9 +89,13 @@ class Kernel {
 
 NB_MODULE(_kernel, m) {
   m.doc() = "Planar chain solver: Riccati-Newton SQP on the reduced coordinates, followed along a branch.";
+  m.attr("SHAPE_SIZE") = ccr::kShapeSize;
+  m.def("measure_gaps", &measure_gaps, "kind"_a, "parameters"_a, "points"_a, "gaps"_a,
+        "Write value, x and y slope of the gap of each point to one obstacle.");
   nb::class_<Kernel>(m, "Kernel", "Solver of one robot in one scene; holds scratch memory and no state between calls.")
-      .def(nb::init<int, double, double, double, double, const Kinds&, const Input&, const Mask&>(), "segments"_a,
-           "length"_a, "offset"_a, "stiffness"_a, "max_tension"_a, "kinds"_a, "parameters"_a, "touchable"_a)
+      .def(nb::init<int, double, double, double, double, const Kinds&, const Input&, const Input&, const Mask&>(), "segments"_a,
+           "length"_a, "offset"_a, "stiffness"_a, "max_tension"_a, "kinds"_a, "parameters"_a, "extents"_a,
+           "touchable"_a)
       .def_prop_ro("block_size", &Kernel::block_size, "Length of an equilibrium's block.")
       .def("step", &Kernel::step, "from_"_a, "target"_a, "to"_a,
            "Follow the branch from one block to a cable displacement into another; returns (status, iterations).")

@@ -47,7 +47,7 @@ void Branch::store(double* block) const {
   std::fill_n(block, chain.contacts(), 0.0);
   for (int j = 0; j < present_.active.count; ++j) block[present_.active.contact[j]] = present_.active.multiplier[j];
   block += chain.contacts();
-  std::copy(chain.gaps().begin(), chain.gaps().end(), block);
+  chain.survey(block);
 }
 
 double Branch::measure_tension() const { return newton_.chain.robot().stiffness * newton_.chain.cable_slope(); }
@@ -73,7 +73,7 @@ void Branch::settle() {
   settled_ = true;
 }
 
-// Whether every point came here from the last accepted shape without cutting through a circle or jumping.
+// Whether every point came here from the last accepted shape without cutting through an obstacle or jumping.
 bool Branch::passable(double allowed) const {
   const Chain& chain = newton_.chain;
   const int nodes = chain.robot().segments + 1;
@@ -83,21 +83,11 @@ bool Branch::passable(double allowed) const {
     farthest = std::max(farthest, dx * dx + dy * dy);
   }
   if (farthest > allowed * allowed) return false;
+  farthest = std::sqrt(farthest);
   for (const Obstacle& obstacle : chain.obstacles()) {
-    if (obstacle.shape != Shape::kCircle) continue;
-    const double core = (1 - kSweepDepth) * obstacle.parameters[2];
-    for (int first = 0; first < kPoints * nodes; first += nodes)
-      for (int i = 0; i < nodes; ++i) {
-        const double px = points_[first + i][0] - obstacle.parameters[0];
-        const double py = points_[first + i][1] - obstacle.parameters[1];
-        if (!obstacle.touchable[i] || px * px + py * py > (core + allowed) * (core + allowed)) continue;
-        const double dx = chain.points()[first + i][0] - points_[first + i][0];
-        const double dy = chain.points()[first + i][1] - points_[first + i][1];
-        const double length = dx * dx + dy * dy;
-        const double t = length > 0 ? std::clamp(-(px * dx + py * dy) / length, 0.0, 1.0) : 0.0;
-        const double qx = px + t * dx, qy = py + t * dy;
-        if (qx * qx + qy * qy < core * core) return false;
-      }
+    if (farthest <= kSweepStride * obstacle.fineness) continue;
+    for (int k = 0; k < kPoints * nodes; ++k)
+      if (obstacle.touchable[k % nodes] && !passes(obstacle, points_[k], chain.points()[k])) return false;
   }
   return true;
 }

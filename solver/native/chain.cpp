@@ -3,29 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-// The generated laws of the gaps, inlined here.
-#define CASADI_SYMBOL_EXPORT static inline
-#include "gap_laws.c"
+#include <numeric>
 
 namespace ccr {
 
 namespace {
-
-struct GapLaw {
-  double value, x, y, xx, xy, yy;
-};
-
-GapLaw gap_law(const Obstacle& obstacle, const Position& point) {
-  GapLaw law;
-  const double* in[] = {point.v.data(), obstacle.parameters.data()};
-  double* out[] = {&law.value};
-  if (obstacle.shape == Shape::kCircle)
-    ccr_circle_gap(in, out, nullptr, nullptr, 0);
-  else
-    ccr_half_plane_gap(in, out, nullptr, nullptr, 0);
-  return law;
-}
 
 // Moment of the adjoint about the lower node: a turn of the segment moves the next node by (-dy, dx).
 double moment(const State& adjoint, const Bend& bend) { return adjoint[1] * bend.dx - adjoint[0] * bend.dy; }
@@ -39,10 +21,11 @@ Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
       states_(robot.segments + 1),
       levers_(robot.segments + 1),
       points_(kPoints * (robot.segments + 1)),
-      gaps_(obstacles.size() * points_.size()),
+      gaps_(obstacles.size() * points_.size(), std::numeric_limits<double>::infinity()),
       pulls_(robot.segments + 1),
       adjoints_(robot.segments),
       gradient_(robot.segments) {
+  near_.reserve(gaps_.size());
   for (int c = 0; c < contacts(); ++c) {
     const int points = kPoints * (robot.segments + 1);
     sites_.push_back({c / points, c % points, c % (robot.segments + 1)});
@@ -76,24 +59,46 @@ bool Chain::evaluate(const std::vector<Control>& shear, double cable) {
   return true;
 }
 
+// Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
 void Chain::measure_gaps() {
   const int nodes = robot_.segments + 1;
-  double* gap = gaps_.data();
-  for (const Obstacle& obstacle : obstacles_)
-    for (const Position* point = points_.data(); point != points_.data() + points_.size(); point += nodes)
-      for (int i = 0; i < nodes; ++i)
-        *gap++ = obstacle.touchable[i] ? gap_law(obstacle, point[i]).value : std::numeric_limits<double>::infinity();
+  for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
+  near_.clear();
+  for (std::size_t j = 0; j < obstacles_.size(); ++j)
+    for (int i = 0; i < nodes; ++i) {
+      const double distance = clearance(obstacles_[j], points_[i]) - robot_.offset - limits::kReach;
+      if (distance > 0) {
+        i += static_cast<int>(std::min(distance / robot_.length, static_cast<double>(nodes)));
+        continue;
+      }
+      if (!obstacles_[j].touchable[i]) continue;
+      for (int point = 0; point < kPoints; ++point) {
+        const int contact = (static_cast<int>(j) * kPoints + point) * nodes + i;
+        gaps_[contact] = ccr::measure_gap(obstacles_[j], this->point(contact)).value;
+        near_.push_back(contact);
+      }
+    }
+}
+
+void Chain::survey(double* gaps) const {
+  const std::size_t nodes = robot_.segments + 1;
+  for (const Obstacle& obstacle : obstacles_) {
+    ccr::measure_gaps(obstacle, points_, gaps);
+    for (std::size_t k = 0; k < points_.size(); ++k)
+      if (!obstacle.touchable[k % nodes]) gaps[k] = std::numeric_limits<double>::infinity();
+    gaps += points_.size();
+  }
 }
 
 State Chain::slope(int contact) const {
-  const GapLaw law = gap_law(obstacle(contact), point(contact));
+  const Gap law = ccr::measure_gap(obstacle(contact), point(contact));
   const Position lever = this->lever(contact);
   return {{law.x, law.y, law.y * lever[0] - law.x * lever[1]}};
 }
 
 double Chain::violation() const {
   double worst = 0;
-  for (const double gap : gaps_) worst = std::max(worst, -gap);
+  for (const int contact : near_) worst = std::max(worst, -gaps_[contact]);
   return worst;
 }
 
@@ -133,7 +138,7 @@ void Chain::curvature(const ActiveSet& active, System& system) const {
   system.node_hessian[robot_.segments] = {};
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
-    const GapLaw law = gap_law(obstacle(contact), point(contact));
+    const Gap law = ccr::measure_gap(obstacle(contact), point(contact));
     const Position lever = this->lever(contact);
     const double tx = -lever[1], ty = lever[0];  // point motion per disk turn
     const double mixed_x = law.xx * tx + law.xy * ty, mixed_y = law.xy * tx + law.yy * ty;

@@ -6,6 +6,7 @@
 
 #include "limits.hpp"
 #include "linalg.hpp"
+#include "obstacle.hpp"
 #include "riccati.hpp"
 #include "segment.hpp"
 
@@ -19,18 +20,10 @@ struct Robot {
   double max_tension;  // [N]
 };
 
-enum class Shape { kCircle, kHalfPlane };
 enum Point { kBackbone, kCable, kPoints };
-
-struct Obstacle {
-  Shape shape;
-  std::array<double, 3> parameters;      // circle: x, y, r; half-plane: outward normal, offset
-  std::vector<unsigned char> touchable;  // (n+1): whether a node can touch it
-};
 
 using State = Vec<3>;    // x, y, disk angle
 using Control = Vec<1>;  // sine of the shear angle
-using Position = Vec<2>;
 
 // Dynamics of a segment in its lower state: the identity, and the motion of the next node per turn of the disk.
 struct Turn {
@@ -96,7 +89,10 @@ class Chain {
   double free_angle() const { return pull_ / robot_.offset; }
   const std::vector<State>& states() const { return states_; }
   const std::vector<Position>& points() const { return points_; }  // (point, node)
+  // Contacts within reach, and the gap of every contact, infinite for those that are not.
+  const std::vector<int>& near() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
+  void survey(double* gaps) const;  // of every contact, whether within reach or not
   State slope(int contact) const;  // of a gap with respect to the state of its node
   const std::vector<Control>& gradient() const { return gradient_; }
 
@@ -123,6 +119,7 @@ class Chain {
   std::vector<Position> points_;
   std::vector<Site> sites_;
   std::vector<double> gaps_;
+  std::vector<int> near_;
   std::vector<State> pulls_;     // Σ λ ∇c at each node
   std::vector<State> adjoints_;  // of the state each segment leads to
   std::vector<Control> gradient_;

@@ -151,7 +151,7 @@ int Contacts::most_violated(const Chain& chain, const ActiveSet& active, const D
     reach = std::max(reach, std::abs(d[0]) + std::abs(d[1]) + chain.robot().offset * std::abs(d[2]));
   int worst = -1;
   double lowest = -kFeasibility / 2;
-  for (int c = 0; c < chain.contacts(); ++c) {
+  for (const int c : chain.near()) {
     const double gap = chain.gaps()[c];
     if (gap > 2 * reach) continue;
     const double predicted = gap + dot(chain.slope(c), step.states[chain.node(c)]);

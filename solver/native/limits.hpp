@@ -17,6 +17,9 @@ inline constexpr double kNewtonClose = 1e-4;    // after a change this small the
 inline constexpr double kArmijo = 1e-4;
 inline constexpr int kBacktracks = 6;
 
+// Broad phase: a point farther than this from an obstacle is not looked at before the answer is [mm].
+inline constexpr double kReach = 10.0;
+
 // Active set.
 inline constexpr int kMaxActive = 32;
 inline constexpr int kActiveSetChanges = 96;
@@ -38,7 +41,8 @@ inline constexpr double kLargestStep = 0.5;    // cable displacement of one sub-
 inline constexpr double kSmallestStep = 1e-4;
 inline constexpr double kMoveOffset = 0.5;     // a node moves at most kMoveOffset + kMoveSlope * |step| in a sub-step
 inline constexpr double kMoveSlope = 16.0;
-inline constexpr double kSweepDepth = 0.125;   // fraction of the radius a point's path may cut into a circle
+inline constexpr double kSweepDepth = 0.125;   // a point's path may cut this deep into an obstacle, and is looked at
+inline constexpr double kSweepStride = 0.5;    // this often: fractions of the smallest radius of the obstacle's surface
 inline constexpr int kSubSteps = 400;
 inline constexpr int kBranchEnds = 24;         // ends met in one step before the robot counts as jammed
 

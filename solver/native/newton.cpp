@@ -72,7 +72,7 @@ double Newton::cap(double largest) const {
 
 double Newton::merit(double weight) const {
   double violation = 0;
-  for (const double gap : chain.gaps()) violation += std::max(0.0, -gap);
+  for (const int contact : chain.near()) violation += std::max(0.0, -chain.gaps()[contact]);
   return chain.objective() + weight * violation;
 }
 

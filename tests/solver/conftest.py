@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import pytest
 
-from solver import Circle, Robot, Scene
+from solver import Capsule, Circle, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene
 
 
 def make_circles(*circles: tuple[float, float, float]) -> Scene:
@@ -29,7 +29,7 @@ def inside(points: np.ndarray, polygons: np.ndarray) -> np.ndarray:
 
 
 def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
-    """Whether a circle's centre lies in what the backbone or the cable sweeps between consecutive shapes.
+    """Whether an obstacle's centre lies in what the backbone or the cable sweeps between consecutive shapes.
 
     Args:
         shapes: Node poses (k, n+1, 3).
@@ -37,7 +37,8 @@ def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
     Returns:
         (k-1, m) bool.
     """
-    centres = np.array([obstacle.center for obstacle in scene if isinstance(obstacle, Circle)])
+    centres = np.array([obstacle.extent.center for obstacle in scene if np.isfinite(obstacle.extent.radius)])
+    centres = centres.reshape(-1, 2)
     swept = np.zeros((len(shapes) - 1, len(centres)), dtype=bool)
     for line in (shapes[..., :2], cable_points(shapes, robot.offset_mm)):
         before, after = line[:-1], line[1:]
@@ -47,14 +48,38 @@ def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
 
 
 def clearance(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
-    """Smallest gap of each shape to the circles of a scene, (k,) [mm]."""
+    """Smallest gap of each shape to the obstacles of a scene that every node meets, (k,) [mm]."""
     points = np.concatenate([shapes[..., :2], cable_points(shapes, robot.offset_mm)], axis=1)
-    gaps = [
-        (np.sum((points - obstacle.center) ** 2, axis=-1) - obstacle.radius**2) / (2 * obstacle.radius)
-        for obstacle in scene
-        if isinstance(obstacle, Circle)
-    ]
-    return np.min(gaps, axis=(0, 2))
+    return np.min([obstacle.gap(points) for obstacle in scene if obstacle.nodes is None], axis=(0, 2))
+
+
+def random_shape(generator: np.random.Generator) -> Obstacle:
+    """Any kind of obstacle in front of the robot; straight ones clear of the unactuated robot."""
+    x, y = generator.uniform((40, 75), (75, 150))
+    axis, across, along = generator.normal(size=2), generator.uniform(6, 12), generator.uniform(6, 20)
+    axis /= np.linalg.norm(axis)
+    match generator.integers(5):
+        case 0:
+            return Circle(center=(x, y), radius=across)
+        case 1:
+            return Ellipse(center=(x, y), radii=(across + 3, along), axis=tuple(axis))
+        case 2:
+            return Capsule(start=tuple((x, y) - along * axis), end=tuple((x, y) + along * axis), radius=across)
+        case 3:
+            count = generator.integers(4, 9)
+            angles = 2 * np.pi / count * (np.arange(count) + generator.uniform(0, 0.4, count))
+            ring = (x, y) + 12 * np.column_stack([np.cos(angles), np.sin(angles)])
+            return Polygon(corners=tuple(map(tuple, ring)), radius=generator.uniform(1, 5))
+        case _:
+            return HalfPlane(point=(x, y), normal=(-1, generator.uniform(-1, 1)))
+
+
+def random_shapes(generator: np.random.Generator) -> Scene:
+    """One to four obstacles of any kind that leave the unactuated robot free."""
+    while True:
+        scene = Scene(random_shape(generator) for _ in range(generator.integers(1, 5)))
+        if clearance(np.zeros((1, 19, 3)) + [[0, 10 * k, 0] for k in range(19)], Robot.prototype(), scene).min() > 1:
+            return scene
 
 
 def random_scene(generator: np.random.Generator) -> Scene:
@@ -81,6 +106,11 @@ def clearance_fixture() -> Callable[[np.ndarray, Robot, Scene], np.ndarray]:
 @pytest.fixture(name="random_scene")
 def random_scene_fixture() -> Callable[[np.random.Generator], Scene]:
     return random_scene
+
+
+@pytest.fixture(name="random_shapes")
+def random_shapes_fixture() -> Callable[[np.random.Generator], Scene]:
+    return random_shapes
 
 
 @pytest.fixture(name="pulls")

@@ -127,3 +127,17 @@ def test_an_equilibrium_serves_equal_solvers():
     scene = Scene([Circle(center=(33, 89), radius=12.5)])
     equilibrium = Solver(Robot.prototype(), scene).rest()
     assert Solver(Robot.prototype(), Scene(list(scene))).step(equilibrium, 2.0).status is Status.CONVERGED
+
+
+def test_far_obstacles_change_nothing(circles):
+    """Those out of reach are passed over on the way, and measured in the answer."""
+    near, far = BLOCKING[:1], [(60 + 12 * k, -30 - 5 * k, 4.0) for k in range(31)]
+    alone, crowded = (Solver(Robot.prototype(), circles(*obstacles)) for obstacles in (near, (*near, *far)))
+    one, many = alone.rest(), crowded.rest()
+    for cable in (4.0, 8.0, 11.0, 9.0):
+        one, many = alone.step(one, cable), crowded.step(many, cable)
+        assert one.contact.any()
+        assert np.array_equal(one.nodes, many.nodes)
+        assert np.array_equal(one.multipliers[0], many.multipliers[0])
+        points = np.stack([many.nodes[:, :2], many.cable_nodes])
+        assert many.gaps == pytest.approx(np.array([obstacle.gap(points) for obstacle in many.scene]), rel=1e-12)

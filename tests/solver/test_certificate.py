@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
+from solver.formulation import GAP_LAWS
 
 obstacles = st.builds(
     lambda x, y, r: Circle(center=(x, y), radius=r), st.floats(35, 75), st.floats(75, 150), st.floats(10, 16)
@@ -25,7 +26,21 @@ def follow(solver, changes):
 @settings(max_examples=60, deadline=None, derandomize=True, database=None)
 @given(scene=scenes, start=st.floats(1, 8), changes=increments)
 def test_residuals(scene, start, changes):
-    for equilibrium in follow(Solver(Robot.prototype(), scene), [start, *changes]):
+    certify(follow(Solver(Robot.prototype(), scene), [start, *changes]))
+
+
+def test_residuals_of_every_shape(random_shapes):
+    generator, touched = np.random.default_rng(3), set()
+    for _ in range(60):
+        scene = random_shapes(generator)
+        states = list(follow(Solver(Robot.prototype(), scene), generator.uniform(-0.2, 0.6, 40)))
+        certify(states)
+        touched |= {scene.kinds[j] for state in states for j in state.contact.any(axis=(1, 2)).nonzero()[0]}
+    assert touched == set(GAP_LAWS)
+
+
+def certify(equilibria):
+    for equilibrium in equilibria:
         residuals = equilibrium.residuals()
         assert equilibrium.status is not Status.FAILED
         assert residuals.stationarity <= 1e-8

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from solver import Robot, Solver
+from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Solver
 from solver.formulation import (
     GAP_LAWS,
     gap_function,
@@ -18,7 +18,14 @@ from solver.formulation import (
 
 LENGTH, OFFSET = 10.0, 8.0
 THETA, SLOPE, CURVATURE, PULL_SLOPE, COS_ZETA, SIN_ZETA, ZETA_SLOPE, ZETA_CURVATURE, COS_THETA, SIN_THETA = range(10)
-SHAPES = {"circle": [40.0, 100.0, 12.0], "half_plane": [-0.6, 0.8, 30.0]}
+OBSTACLES = [
+    Circle(center=(40, 100), radius=12),
+    HalfPlane(point=(-18, 24), normal=(-0.6, 0.8)),
+    Ellipse(center=(40, 100), radii=(15, 6), axis=(1, 2)),
+    Capsule(start=(35, 95), end=(48, 99), radius=5),
+    Polygon(corners=((35, 95), (48, 95), (52, 104), (44, 110)), radius=3),
+]
+EVERY_OBSTACLE = pytest.mark.parametrize("obstacle", OBSTACLES, ids=[obstacle.kind for obstacle in OBSTACLES])
 
 segments = pytest.mark.parametrize(("sine", "pull"), [(0.0, 0.3), (0.2, 0.05), (-0.35, 0.7), (0.5, 1.2)])
 
@@ -56,23 +63,35 @@ def test_closure_vanishes_at_the_half_sine(law, sine, pull):
     assert 2 * math.asin(float(half_sine)) == pytest.approx(law(sine, pull)[THETA], abs=1e-14)
 
 
-@pytest.mark.parametrize("kind", GAP_LAWS)
-def test_gap_derivatives(kind):
-    function, shape, point = gap_function(kind), SHAPES[kind], np.array([33.0, 91.0])
-    law = lambda p: function(p, shape).full().ravel()  # noqa: E731
+def test_every_law_has_an_obstacle():
+    assert [obstacle.kind for obstacle in OBSTACLES] == list(GAP_LAWS)
+
+
+@EVERY_OBSTACLE
+@pytest.mark.parametrize("point", [(33.0, 91.0), (41.0, 91.5), (57.0, 104.0), (43.0, 97.0)])
+def test_gap_derivatives(obstacle, point):
+    function = gap_function(obstacle.kind)
+    law = lambda p: function(p, obstacle.parameters).full().ravel()  # noqa: E731
     value = law(point)
+    assert obstacle.gap(np.array(point)) == pytest.approx(value[0], abs=1e-13)
+    assert obstacle.normal_at(np.array(point)) == pytest.approx(value[1:3], abs=1e-13)
     for k, axis in enumerate(np.eye(2)):
         along = difference(lambda s, axis=axis: law(point + s * axis), 0.0, 1e-4)
-        assert value[1 + k] == pytest.approx(along[0], abs=1e-8)
-        assert value[[3 + k, 4 + k]] == pytest.approx(along[1:3], abs=1e-8)
+        assert value[1 + k] == pytest.approx(along[0], abs=1e-7)
+        assert value[[3 + k, 4 + k]] == pytest.approx(along[1:3], abs=1e-7)
 
 
-@pytest.mark.parametrize("kind", GAP_LAWS)
-def test_gap_has_a_unit_slope_on_the_surface(kind):
-    surface = {"circle": (40 + 12 * math.cos(1), 100 + 12 * math.sin(1)), "half_plane": (-18.0, 24.0)}[kind]
-    value = gap_function(kind)(surface, SHAPES[kind]).full().ravel()
-    assert value[0] == pytest.approx(0, abs=1e-12)
-    assert math.hypot(value[1], value[2]) == pytest.approx(1, abs=1e-12)
+@EVERY_OBSTACLE
+def test_gap_on_the_outline(obstacle):
+    """No gap, and a unit slope that points outwards, on the surface; the disc of the extent holds it."""
+    outline = obstacle.outline()
+    slopes = obstacle.normal_at(outline)
+    assert obstacle.gap(outline) == pytest.approx(0, abs=1e-12)
+    assert np.linalg.norm(slopes, axis=-1) == pytest.approx(1, abs=1e-12)
+    assert obstacle.gap(outline + 0.1 * slopes) == pytest.approx(0.1, abs=0.005)
+    center, radius, fineness = obstacle.extent
+    assert np.linalg.norm(outline - center, axis=-1).max() <= radius * (1 + 1e-12)
+    assert 0 < fineness <= radius
 
 
 def test_node_problem_at_a_solution(circles, pulls):

@@ -3,6 +3,7 @@
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from solver import Robot, Solver, Status
 
@@ -17,7 +18,9 @@ def walk(solver, changes):
     return states, commands
 
 
-def test_random_walk(pytestconfig, random_scene, swept):
+@pytest.mark.parametrize("scenes", ["random_scene", "random_shapes"])
+def test_random_walk(pytestconfig, request, scenes, swept):
+    random_scene = request.getfixturevalue(scenes)
     generator, robot, counts = np.random.default_rng(0), Robot.prototype(), Counter()
     for _ in range(pytestconfig.getoption("soak") // STEPS_PER_SCENE):
         scene = random_scene(generator)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solver import Circle, HalfPlane, Robot, Scene, Solver
+from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver
 
 PROTOTYPE = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0}
 
@@ -63,14 +63,17 @@ def test_half_plane(change, message):
 
 
 def test_scene():
-    with pytest.raises(TypeError, match="is not an obstacle; give Circle or HalfPlane"):
+    with pytest.raises(TypeError, match="is not an obstacle; give a Circle, HalfPlane"):
         Scene([(40.0, 100.0, 10.0)])
 
 
 @pytest.mark.parametrize(
     ("obstacle", "message"),
     [
-        (Circle(center=(10, 80), radius=12), r"Circle\(10.0, 80.0, 12\) overlaps the straight robot by .* mm at node"),
+        (
+            Circle(center=(10, 80), radius=12),
+            r"Circle\(.*center=\(10.0, 80.0\), radius=12\) overlaps the straight robot by .* mm at node",
+        ),
         (HalfPlane(point=(7, 0), normal=(-1, 0)), "HalfPlane.* overlaps the straight robot by 1 mm"),
         (
             HalfPlane(point=(30, 0), normal=(-1, 0), nodes=(19,)),
@@ -107,3 +110,27 @@ def test_equilibrium_is_read_only(circles):
     for array in (equilibrium.block, equilibrium.nodes, equilibrium.multipliers, equilibrium.gaps):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Ellipse(center=(0, 0), radii=(3, -1)), "a half-axis of radii is -1.0; it must be positive"),
+        (lambda: Ellipse(center=(0, 0), radii=(3, 1), axis=(0, 0)), r"axis is \(0, 0\); give the direction"),
+        (lambda: Capsule(start=(1, 2), end=(1, 2), radius=1), "must differ"),
+        (lambda: Capsule(start=(1, 2), end=(1, 3), radius=0), "radius is 0; it must be positive and finite"),
+        (lambda: Polygon(corners=((0, 0), (1, 0)), radius=1), "corners has 2 points; it must have 3 to 8"),
+        (lambda: Polygon(corners=((0, 0), (2, 0), (1, 0.5), (1, 2)), radius=1), "once round a convex polygon"),
+        (lambda: Polygon(corners=((0, 0), (1, 0), (2, 0), (1, 2)), radius=1), "none straight"),
+        (lambda: Scene([Circle(center=(40, 0), radius=1)] * 33), "obstacles has 33 entries; a scene holds at most 32"),
+    ],
+)
+def test_shape(build, message):
+    with pytest.raises(ValueError, match=message):
+        build()
+
+
+def test_polygon_in_either_sense():
+    corners = ((30, 90), (50, 90), (50, 100), (30, 100))
+    assert Polygon(corners=corners, radius=1) == Polygon(corners=corners[::-1], radius=1)
+    assert Polygon(corners=corners[::-1], radius=1).gap(np.array([40.0, 80.0])) == pytest.approx(9)

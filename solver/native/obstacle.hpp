@@ -1,0 +1,42 @@
+// Obstacles and the generated laws of their gaps.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "linalg.hpp"
+
+namespace ccr {
+
+using Position = Vec<2>;
+
+enum class Shape { kCircle, kHalfPlane, kEllipse, kCapsule, kPolygon };  // in the order of GAP_LAWS
+
+inline constexpr int kShapeSize = 17;  // numbers of the largest shape
+
+struct Obstacle {
+  Shape shape;
+  std::array<double, kShapeSize> parameters;  // as the gap law takes them
+  Position center;                       // of a disc that holds it
+  double radius;                         // of that disc; infinite for a half-plane
+  double fineness;                       // smallest radius of its surface; infinite for a half-plane
+  std::vector<unsigned char> touchable;  // (n+1): whether a node can touch it
+};
+
+struct Gap {
+  double value, x, y, xx, xy, yy;  // and its derivatives in the point
+};
+
+Gap measure_gap(const Obstacle& obstacle, const Position& point);
+
+// Gaps of several points, without their derivatives.
+void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, double* gaps);
+
+// A lower bound of the distance between a point and the obstacle.
+double clearance(const Obstacle& obstacle, const Position& point);
+
+// Whether the straight path from one point outside to another stays out of the obstacle, but for its very rim.
+bool passes(const Obstacle& obstacle, const Position& from, const Position& to);
+
+}  // namespace ccr
