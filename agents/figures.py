@@ -70,8 +70,7 @@ def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
     axis.plot(nodes[:, 0], nodes[:, 1], color=BACKBONE, lw=2.5)
     axis.plot(cable[:, 0], cable[:, 1], color=CABLE, lw=1)
     touched: np.ndarray = np.asarray(equilibrium.contact.any(axis=0))
-    for points, touching in zip((nodes[:, :2], cable), touched, strict=True):
-        axis.plot(*points[touching].T, "o", color="crimson", ms=6, mfc="none")
+    axis.plot(*equilibrium.points[touched].T, "o", color="crimson", ms=6, mfc="none")
     axis.set(aspect="equal", xlim=(-25, 125), ylim=(-5, 190), xlabel="x [mm]")
     axis.grid(alpha=0.3)
 

@@ -35,7 +35,7 @@ def dict_space(robot: Robot, force_sensor: bool) -> spaces.Dict:
     nodes = robot.segments + 1
     entries: dict[str, spaces.Space[np.ndarray]] = {
         "cable": _box(0, (1,)),
-        "contact": _box(0, (2 * nodes,)),
+        "contact": _box(0, (len(robot.touch) * robot.positions,)),
         "desired_force": _box(0, (1,)),
         "force_error": _box(-1, (1,)),
         "force_est": _box(-1, (2,)),

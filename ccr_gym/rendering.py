@@ -400,7 +400,7 @@ def draw_robot(canvas: Canvas, equilibrium: Equilibrium) -> None:
 
 def draw_contacts(canvas: Canvas, equilibrium: Equilibrium) -> None:
     """A marker on each point that touches an obstacle."""
-    for point in canvas.camera(robot_points(equilibrium)[equilibrium.contact.any(axis=0)]):
+    for point in canvas.camera(equilibrium.points[equilibrium.contact.any(axis=0)]):
         draw_marker(canvas, point)
 
 
@@ -417,17 +417,12 @@ def draw_forces(canvas: Canvas, frame: Frame) -> None:
     if not equilibrium.contact.any():
         return
     weights = np.where(equilibrium.contact, equilibrium.multipliers, 0.0).sum(axis=0)
-    start = canvas.camera(np.average(robot_points(equilibrium).reshape(-1, 2), axis=0, weights=weights.ravel()))
+    start = canvas.camera(np.average(equilibrium.points.reshape(-1, 2), axis=0, weights=weights.ravel()))
     for force, width, color in (
         (frame.force_true, LAYOUT.arrow, PALETTE.force_true),
         (frame.force_est, LAYOUT.arrow_slim, PALETTE.force_est),
     ):
         draw_arrow(canvas, start, arrow_of(canvas.camera, force, frame.force_scale), width, color)
-
-
-def robot_points(equilibrium: Equilibrium) -> np.ndarray:
-    """Backbone and cable points, ``(2, n+1, 2)`` [mm]."""
-    return np.stack([equilibrium.nodes[:, :2], equilibrium.cable_nodes])
 
 
 def arrow_of(camera: Camera, force: np.ndarray, full_scale: float) -> np.ndarray:

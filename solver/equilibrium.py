@@ -1,11 +1,13 @@
 """The result of a solve: one equilibrium of the robot, immutable and complete."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from solver.formulation import node_derivatives
+from solver.geometry import touching_points
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
@@ -34,7 +36,9 @@ class Equilibrium:
     """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
 
     Frame: base at the origin, unactuated backbone along +y, cable on the +x side. Obstacles are counted by m, nodes
-    0…n from the base, points are (backbone, cable). All arrays are read-only.
+    0…n from the base. The points that can touch are counted by line and position, (p, k): the lines of ``robot.touch``,
+    by default (backbone, cable), and along each ``robot.between`` points between every two nodes, by default none, so
+    that a position is a node. All arrays are read-only.
 
     Attributes:
         robot: The robot.
@@ -86,23 +90,28 @@ class Equilibrium:
         return self.block[6 + 4 * n : 8 + 6 * n].reshape(n + 1, 2)
 
     @property
+    def points(self) -> np.ndarray:
+        """The points that can touch, ``(p, k, 2)`` [mm]."""
+        return touching_points(self.robot, self.nodes)
+
+    @property
     def multipliers(self) -> np.ndarray:
-        """Lagrange multipliers of the gaps, ``(m, 2, n+1)`` [rad²/mm]."""
+        """Lagrange multipliers of the gaps, ``(m, p, k)`` [rad²/mm]."""
         return self._contacts(0)
 
     @property
     def gaps(self) -> np.ndarray:
-        """Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, 2, n+1)`` [mm]."""
+        """Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, p, k)`` [mm]."""
         return self._contacts(1)
 
     def _contacts(self, which: int) -> np.ndarray:
-        n, m = self.robot.segments, len(self.scene)
-        start = 8 + 6 * n + which * 2 * m * (n + 1)
-        return self.block[start : start + 2 * m * (n + 1)].reshape(m, 2, n + 1)
+        shape = (len(self.scene), len(self.robot.touch), self.robot.positions)
+        start, size = 8 + 6 * self.robot.segments, math.prod(shape)
+        return self.block[start + which * size : start + (which + 1) * size].reshape(shape)
 
     @property
     def contact(self) -> np.ndarray:
-        """Which points touch which obstacle: a positive multiplier, ``(m, 2, n+1)`` bool."""
+        """Which points touch which obstacle: a positive multiplier, ``(m, p, k)`` bool."""
         return self.multipliers > 0
 
     def residuals(self) -> Residuals:
@@ -115,7 +124,7 @@ class Equilibrium:
         parameters += [value for obstacle in self.scene for value in obstacle.parameters]
         unknowns = np.concatenate([self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel()])
         slope, lengths, equality_slopes, gaps, gap_slopes = (
-            value.full() for value in node_derivatives(self.robot.segments, self.scene.kinds)(unknowns, parameters)
+            value.full() for value in node_derivatives(self.robot, self.scene.kinds)(unknowns, parameters)
         )
         forces = self.multipliers[:, :, 1:].ravel()
         touchable = np.isfinite(self.gaps[:, :, 1:].ravel())

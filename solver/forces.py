@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.equilibrium import Equilibrium
+from solver.geometry import touchable_points, touching_points
 from solver.robot import Robot
 from solver.scene import Scene
 
@@ -142,9 +143,8 @@ def free_tension(robot: Robot, cable_mm: float) -> float:
 def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
     """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact."""
     nodes = free_nodes(robot, cable_mm)
-    cable = nodes[:, :2] + robot.offset_mm * np.stack([np.cos(nodes[:, 2]), np.sin(nodes[:, 2])], axis=1)
-    points = np.stack([nodes[:, :2], cable])
-    gaps = [obstacle.gap(points)[:, obstacle.touchable(len(nodes))].min() for obstacle in scene]
+    points = touching_points(robot, nodes)
+    gaps = [obstacle.gap(points)[touchable_points(robot, obstacle)].min() for obstacle in scene]
     return float(min(gaps, default=np.inf))
 
 
@@ -169,8 +169,8 @@ def _contacts(equilibrium: Equilibrium) -> list[tuple[int, float, np.ndarray]]:
     found = multipliers.nonzero()
     if not found[0].size:
         return []
-    points, obstacles = (equilibrium.nodes, equilibrium.cable_nodes), equilibrium.scene.obstacles
+    points, obstacles = equilibrium.points, equilibrium.scene.obstacles
     return [
-        (j, float(multipliers[j, point, node]), obstacles[j].normal_at(points[point][node, :2]))
-        for j, point, node in zip(*(index.tolist() for index in found), strict=True)
+        (j, float(multipliers[j, line, position]), obstacles[j].normal_at(points[line, position]))
+        for j, line, position in zip(*(index.tolist() for index in found), strict=True)
     ]

@@ -13,10 +13,13 @@ The first two are turned into C when the package is built (:mod:`solver.codegen`
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
+
+if TYPE_CHECKING:  # the build runs this file alone
+    from solver.robot import Robot
 
 
 def segment_half_sine(sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
@@ -164,7 +167,8 @@ class NodeProblem(NamedTuple):
         parameters: ``(l, L0, a)`` then the shapes of the obstacles, one after the other.
         objective: Sum of squared disk angles [rad²].
         equalities: Backbone, cable and disk lengths of the segments minus their values, ``(3n,)`` [mm].
-        gaps: Gap of every point of nodes 1…n to every obstacle, ordered (obstacle, point, node), ``(2nm,)`` [mm].
+        gaps: Gap of every point that can touch, but for node 0, to every obstacle, ordered (obstacle, line, position),
+            ``(m·p·(k-1),)`` [mm].
     """
 
     unknowns: ca.MX
@@ -174,11 +178,12 @@ class NodeProblem(NamedTuple):
     gaps: ca.MX
 
 
-def node_problem(segments: int, kinds: tuple[str, ...]) -> NodeProblem:
-    """Build eq. 5 (eq. 4 when ``kinds`` is empty) for ``segments`` segments and the given kinds of obstacle.
+def node_problem(robot: "Robot", kinds: tuple[str, ...]) -> NodeProblem:
+    """Build eq. 5 (eq. 4 when ``kinds`` is empty) for a robot's segments and points, and the given kinds of obstacle.
 
     The arccosine of eq. 4 is written as an arctangent of the same disk directions, which is smooth at zero.
     """
+    segments = robot.segments
     unknowns = ca.MX.sym("unknowns", 4 * segments)
     sizes = [3, *(GAP_LAWS[kind].size for kind in kinds)]
     parameters = ca.MX.sym("parameters", sum(sizes))
@@ -195,10 +200,11 @@ def node_problem(segments: int, kinds: tuple[str, ...]) -> NodeProblem:
         _norms(cable[:, 1:] - cable[:, :-1]) - (total - pull) / segments,
         _norms(after) - offset,
     )
+    lines = {"backbone": backbone, "cable": cable, "rim": 2 * backbone - cable}
     gaps = [
-        _gaps(kind, points[:, 1:], shape)
+        _gaps(kind, _divided(lines[line], robot.between)[:, 1:], shape)
         for kind, shape in zip(kinds, shapes, strict=True)
-        for points in (backbone, cable)
+        for line in robot.touch
     ]
     return NodeProblem(unknowns, parameters, ca.sumsqr(angle), equalities.T, ca.vertcat(*gaps) if gaps else ca.MX(0, 1))
 
@@ -207,15 +213,21 @@ def _norms(columns: ca.MX) -> ca.MX:
     return ca.sqrt(ca.sum1(columns**2))
 
 
+def _divided(line: ca.MX, between: int) -> ca.MX:
+    """The points of a line with as many between every two."""
+    pieces = [line[:, :-1] + k / (between + 1) * (line[:, 1:] - line[:, :-1]) for k in range(between + 1)]
+    return ca.horzcat(ca.reshape(ca.vertcat(*pieces), 2, -1), line[:, -1])
+
+
 def _gaps(kind: str, points: ca.MX, shape: ca.MX) -> ca.MX:
     count = points.shape[1]
     return gap_function(kind).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
 
 
 @lru_cache(maxsize=32)
-def node_derivatives(segments: int, kinds: tuple[str, ...]) -> ca.Function:
+def node_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
     """``(unknowns, parameters) → ∇J, equalities, their Jacobian, gaps, their Jacobian`` of :func:`node_problem`."""
-    problem = node_problem(segments, kinds)
+    problem = node_problem(robot, kinds)
     outputs = [
         ca.gradient(problem.objective, problem.unknowns),
         problem.equalities,

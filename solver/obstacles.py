@@ -17,16 +17,18 @@ SHAPES = {kind: index for index, kind in enumerate(GAP_LAWS)}  # as ccr::Shape i
 
 
 class Extent(NamedTuple):
-    """How large an obstacle is: a disc that holds it, and its finest feature.
+    """How large an obstacle is.
 
     Attributes:
-        center: Centre (x, y) of the disc [mm].
-        radius: Radius of the disc [mm]; infinite for a half-plane.
+        center: Centre (x, y) of a disc that holds it [mm].
+        radius: Radius of that disc [mm]; infinite for a half-plane.
+        width: Smallest distance between parallel lines that hold it [mm]; infinite for a half-plane.
         fineness: Smallest radius of curvature of the surface [mm]; infinite for a half-plane.
     """
 
     center: Pair
     radius: float
+    width: float
     fineness: float
 
 
@@ -125,7 +127,7 @@ class Circle(Obstacle):
     @property
     def extent(self) -> Extent:
         """The disc itself."""
-        return Extent(self.center, self.radius, self.radius)
+        return Extent(self.center, self.radius, 2 * self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
         """Points of the circle, ``(k, 2)`` [mm]."""
@@ -162,7 +164,7 @@ class HalfPlane(Obstacle):
     @property
     def extent(self) -> Extent:
         """Without bounds, and flat."""
-        return Extent(self.point, math.inf, math.inf)
+        return Extent(self.point, math.inf, math.inf, math.inf)
 
     def outline(self) -> np.ndarray:
         """The point of the surface, ``(1, 2)`` [mm]."""
@@ -204,7 +206,8 @@ class Ellipse(Obstacle):
     @property
     def extent(self) -> Extent:
         """The disc of the larger half-axis, and the curvature at its end."""
-        return Extent(self.center, max(self.radii), min(self.radii) ** 2 / max(self.radii))
+        small, large = sorted(self.radii)
+        return Extent(self.center, large, 2 * small, small**2 / large)
 
     def outline(self) -> np.ndarray:
         """Points of the ellipse, ``(k, 2)`` [mm]."""
@@ -248,7 +251,7 @@ class Capsule(Obstacle):
     def extent(self) -> Extent:
         """The disc about the middle of the line."""
         middle = ((self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2)
-        return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, self.radius)
+        return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, 2 * self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
@@ -296,7 +299,8 @@ class Polygon(Obstacle):
     def extent(self) -> Extent:
         """The disc about the mean of the corners."""
         x, y = np.mean(self.corners, axis=0).tolist()
-        return Extent((x, y), max(math.dist((x, y), c) for c in self.corners) + self.radius, self.radius)
+        farthest = max(math.dist((x, y), corner) for corner in self.corners)
+        return Extent((x, y), farthest + self.radius, _width(np.array(self.corners)) + 2 * self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
@@ -331,6 +335,13 @@ def _turns(corners: tuple[Pair, ...]) -> list[float]:
     edges = np.roll(corners, -1, axis=0) - np.asarray(corners)
     headings = np.arctan2(edges[:, 1], edges[:, 0])
     return list(np.remainder(headings - np.roll(headings, 1) + np.pi, 2 * np.pi) - np.pi)
+
+
+def _width(corners: np.ndarray) -> float:
+    """Smallest distance between parallel lines that hold a convex polygon; one of them lies on an edge [mm]."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    inward = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
+    return float(((inward @ corners.T).max(axis=1) - (inward * corners).sum(axis=1)).min())
 
 
 def _directions() -> np.ndarray:

@@ -11,9 +11,10 @@ import numpy as np
 
 from solver.equilibrium import Equilibrium
 from solver.formulation import node_derivatives, node_problem
+from solver.geometry import touchable_points, touching_points
 from solver.robot import Robot
 from solver.scene import Scene
-from solver.solve import check_clear, check_command
+from solver.solve import check_clear, check_command, check_width
 from solver.status import Status
 
 LARGEST_STEP, SMALLEST_STEP = 0.25, 0.03  # cable displacement of one solve, and of the last try of one [mm]
@@ -75,14 +76,18 @@ class ReferenceSolver:
         scene: The obstacles.
 
     Raises:
-        ValueError: If an obstacle overlaps the straight robot or names a node the robot does not have.
+        ValueError: If an obstacle overlaps the straight robot, is narrow enough to slip between its points, or names a
+            node the robot does not have.
     """
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self.robot = robot
         self.scene = scene
         self._shapes = [value for obstacle in scene for value in obstacle.parameters]
-        self._touchable = np.array([obstacle.touchable(robot.segments + 1) for obstacle in scene], dtype=bool)
+        self._contacts = (len(scene), len(robot.touch), robot.positions)
+        touchable = [touchable_points(robot, obstacle) for obstacle in scene]
+        self._touchable = np.array(touchable, dtype=bool).reshape(self._contacts)
+        check_width(robot, scene)
         self._build()
         self._rest = self._equilibrium(self._free(0.0), Status.CONVERGED, 0)
         check_clear(self._rest)
@@ -123,7 +128,7 @@ class ReferenceSolver:
 
     def _build(self) -> None:
         n = self.robot.segments
-        problem = node_problem(n, self.scene.kinds)
+        problem = node_problem(self.robot, self.scene.kinds)
         constraints = ca.vertcat(problem.equalities, problem.gaps)
         # In units of the free robot's segment angle, so that the tolerances mean the same at every displacement.
         free_angle = problem.parameters[0] / (n * problem.parameters[2])
@@ -138,7 +143,7 @@ class ReferenceSolver:
         lagrangian = problem.objective + ca.dot(multipliers, constraints)
         slope = ca.gradient(lagrangian, problem.parameters)[0]
         self._cable_slope = ca.Function("cable_slope", [problem.unknowns, problem.parameters, multipliers], [slope])
-        bounded = np.repeat(self._touchable.reshape(-1, n + 1)[:, None, 1:], 2, axis=1).ravel()
+        bounded = self._touchable[:, :, 1:].ravel()
         self._lower = np.concatenate([np.zeros(3 * n), np.where(bounded, 0.0, -np.inf)])
         self._upper = np.concatenate([np.zeros(3 * n), np.full(bounded.size, np.inf)])
 
@@ -165,11 +170,11 @@ class ReferenceSolver:
 
     def _free(self, cable: float) -> _Point:
         unknowns = self._shape(cable, np.zeros(self.robot.segments))
-        return self._balanced(cable, unknowns, np.zeros(2 * self.robot.segments * len(self.scene)))
+        return self._balanced(cable, unknowns, np.zeros(self._touchable[:, :, 1:].size))
 
     def _balanced(self, cable: float, unknowns: np.ndarray, forces: np.ndarray) -> _Point:
         """A shape with multipliers of its gaps, and those of the equalities by least squares."""
-        derivatives = node_derivatives(self.robot.segments, self.scene.kinds)
+        derivatives = node_derivatives(self.robot, self.scene.kinds)
         slope, _, equality_slopes, _, gap_slopes = (v.full() for v in derivatives(unknowns, self._parameters(cable)))
         balance = gap_slopes.T @ forces - slope.ravel()
         tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
@@ -243,21 +248,21 @@ class ReferenceSolver:
 
     def _equilibrium(self, point: _Point, status: Status, iterations: int) -> Equilibrium:
         pose = self._pose(point.unknowns)
-        multipliers = np.zeros((len(self.scene), 2, self.robot.segments + 1))
-        multipliers[:, :, 1:] = self._forces(point).reshape(-1, 2, self.robot.segments)
+        nodes = np.column_stack([pose.backbone, pose.angles])
+        multipliers = np.zeros(self._contacts)
+        multipliers[:, :, 1:] = self._forces(point).reshape(multipliers[:, :, 1:].shape)
         parts: list[Any] = [
             [point.cable, self._tension(point), np.sum(pose.turns**2)],
             pose.sines,
-            np.column_stack([pose.backbone, pose.angles]),
+            nodes,
             pose.cable,
             multipliers,
-            self._gaps(pose.backbone, pose.cable),
+            self._gaps(nodes),
         ]
         block = np.concatenate([np.ravel(part) for part in parts])
         return Equilibrium(self.robot, self.scene, block, status, iterations)
 
-    def _gaps(self, backbone: np.ndarray, cable: np.ndarray) -> np.ndarray:
-        gaps = np.full((len(self.scene), 2, len(backbone)), np.inf)
-        for j, obstacle in enumerate(self.scene):
-            gaps[j][:, self._touchable[j]] = obstacle.gap(np.stack([backbone, cable]))[:, self._touchable[j]]
-        return gaps
+    def _gaps(self, nodes: np.ndarray) -> np.ndarray:
+        points = touching_points(self.robot, nodes)
+        gaps = np.reshape([obstacle.gap(points) for obstacle in self.scene], self._contacts)
+        return np.where(self._touchable, gaps, np.inf)

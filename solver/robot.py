@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+LINES = ("backbone", "cable", "rim")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
@@ -15,6 +17,9 @@ class Robot:
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tension, never the shape.
         max_tension: Cable tension the motor can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, half a turn of the tip.
+        touch: The lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and
+            ``"rim"``, the edge of the disks opposite to the cable.
+        between: Number of points of each line, evenly spaced between every two nodes, that can touch as well.
 
     Raises:
         ValueError: If a value is not finite, not positive, or out of range; the message names the bound.
@@ -26,10 +31,17 @@ class Robot:
     rigidity: float = 5000.0
     max_tension: float = 15.0
     max_cable_mm: float | None = None
+    touch: tuple[str, ...] = ("backbone", "cable")
+    between: int = 0
 
     def __post_init__(self) -> None:
         for name in ("length_mm", "offset_mm", "rigidity"):
             _require_positive(name, getattr(self, name))
+        object.__setattr__(self, "touch", tuple(self.touch))
+        if not self.touch or len(set(self.touch)) != len(self.touch) or not set(self.touch) <= set(LINES):
+            raise ValueError(f"touch is {self.touch}; it must name some of {LINES}, each once")
+        if not (isinstance(self.between, int) and 0 <= self.between <= 256):
+            raise ValueError(f"between is {self.between!r}; it must be a whole number from 0 to 256")
         if not self.max_tension > 0:
             raise ValueError(f"max_tension is {self.max_tension}; it must be positive (math.inf lifts the limit)")
         if not (isinstance(self.segments, int) and 2 <= self.segments <= 4096):
@@ -57,6 +69,22 @@ class Robot:
     def segment_mm(self) -> float:
         """Length l0 of a backbone segment [mm]."""
         return self.length_mm / self.segments
+
+    @property
+    def lines_mm(self) -> tuple[float, ...]:
+        """Distance of the lines of ``touch`` from the backbone, towards the cable [mm]."""
+        place = {"backbone": 0.0, "cable": self.offset_mm, "rim": -self.offset_mm}
+        return tuple(place[line] for line in self.touch)
+
+    @property
+    def positions(self) -> int:
+        """Number of points of a line that can touch, node 0 included."""
+        return self.segments * (self.between + 1) + 1
+
+    @property
+    def spacing_mm(self) -> float:
+        """Distance between neighbouring points of the backbone that can touch [mm]."""
+        return self.segment_mm / (self.between + 1)
 
     @property
     def stiffness(self) -> float:

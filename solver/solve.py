@@ -6,6 +6,7 @@ import numpy as np
 
 from solver._kernel import SHAPE_SIZE, Kernel
 from solver.equilibrium import Equilibrium
+from solver.geometry import touchable_points
 from solver.obstacles import SHAPES, Obstacle
 from solver.robot import Robot
 from solver.scene import Scene
@@ -23,14 +24,16 @@ class Solver:
         scene: The obstacles.
 
     Raises:
-        ValueError: If an obstacle overlaps the straight robot or names a node the robot does not have.
+        ValueError: If an obstacle overlaps the straight robot, is narrow enough to slip between its points, or names a
+            node the robot does not have.
     """
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self.robot = robot
         self.scene = scene
-        nodes = robot.segments + 1
-        touchable = np.array([obstacle.touchable(nodes) for obstacle in scene], dtype=bool).reshape(len(scene), nodes)
+        points = len(robot.touch) * robot.positions
+        touchable = np.array([touchable_points(robot, obstacle).ravel() for obstacle in scene], dtype=bool)
+        check_width(robot, scene)
         extents = [obstacle.extent for obstacle in scene]
         self._kernel = Kernel(
             robot.segments,
@@ -38,10 +41,12 @@ class Solver:
             robot.offset_mm,
             robot.stiffness,
             robot.max_tension,
+            list(robot.lines_mm),
+            robot.between,
             [SHAPES[kind] for kind in scene.kinds],
             np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
-            np.array([(*center, radius, fineness) for center, radius, fineness in extents], dtype=float),
-            touchable,
+            np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
+            touchable.reshape(len(scene), points),
         )
         self._rest = self._follow(np.zeros(self._kernel.block_size), 0.0)
         check_clear(self._rest)
@@ -85,6 +90,21 @@ class Solver:
         return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
 
 
+def check_width(robot: Robot, scene: Scene) -> None:
+    """Refuse obstacles narrow enough to slip between two points of the robot that can touch.
+
+    Raises:
+        ValueError: Naming the obstacle, its width and what the robot needs.
+    """
+    for obstacle in scene:
+        width = obstacle.extent.width
+        if obstacle.nodes is None and width < robot.spacing_mm:
+            raise ValueError(
+                f"{obstacle!r} is {width:.3g} mm wide and could slip between points {robot.spacing_mm:.3g} mm apart; "
+                f"give the robot between={math.ceil(robot.segment_mm / width) - 1} or more"
+            )
+
+
 def check_clear(rest: Equilibrium) -> None:
     """Refuse obstacles that overlap the straight robot.
 
@@ -93,7 +113,7 @@ def check_clear(rest: Equilibrium) -> None:
     """
     for obstacle, gaps in zip(rest.scene, rest.gaps, strict=True):
         if gaps.min() < 0:
-            node = int(np.unravel_index(gaps.argmin(), gaps.shape)[1])
+            node = int(np.unravel_index(gaps.argmin(), gaps.shape)[1]) // (rest.robot.between + 1)
             raise ValueError(f"{_name(obstacle)} overlaps the straight robot by {-gaps.min():.3g} mm at node {node}")
 
 

@@ -21,9 +21,9 @@ using Kinds = std::vector<int>;
 
 std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& parameters, const Input& extents,
                                           const Mask& touchable) {
-  const std::size_t count = kinds.size(), nodes = touchable.shape(1);
+  const std::size_t count = kinds.size(), points = touchable.shape(1);
   if (parameters.size() != ccr::kShapeSize * count || extents.size() != 4 * count || touchable.shape(0) != count)
-    throw std::invalid_argument("one row of parameters, extents and touchable nodes per obstacle");
+    throw std::invalid_argument("one row of parameters, extents and touchable points per obstacle");
   std::vector<ccr::Obstacle> obstacles(count);
   for (std::size_t i = 0; i < count; ++i) {
     ccr::Obstacle& obstacle = obstacles[i];
@@ -33,7 +33,7 @@ std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& param
     obstacle.center = {{extent[0], extent[1]}};
     obstacle.radius = extent[2];
     obstacle.fineness = extent[3];
-    obstacle.touchable.assign(touchable.data() + nodes * i, touchable.data() + nodes * (i + 1));
+    obstacle.touchable.assign(touchable.data() + points * i, touchable.data() + points * (i + 1));
   }
   return obstacles;
 }
@@ -54,9 +54,10 @@ void measure_gaps(int kind, const Input& parameters, const Input& points, const 
 
 class Kernel {
  public:
-  Kernel(int segments, double length, double offset, double stiffness, double max_tension, const Kinds& kinds,
+  Kernel(int segments, double length, double offset, double stiffness, double max_tension,
+         const std::vector<double>& lines, int between, const Kinds& kinds,
          const Input& parameters, const Input& extents, const Mask& touchable)
-      : branch_({segments, length, offset, stiffness, max_tension},
+      : branch_({segments, length, offset, stiffness, max_tension, lines, between},
                 read_obstacles(kinds, parameters, extents, touchable)) {}
 
   std::size_t block_size() const { return branch_.block_size(); }
@@ -93,8 +94,8 @@ NB_MODULE(_kernel, m) {
   m.def("measure_gaps", &measure_gaps, "kind"_a, "parameters"_a, "points"_a, "gaps"_a,
         "Write value, x and y slope of the gap of each point to one obstacle.");
   nb::class_<Kernel>(m, "Kernel", "Solver of one robot in one scene; holds scratch memory and no state between calls.")
-      .def(nb::init<int, double, double, double, double, const Kinds&, const Input&, const Input&, const Mask&>(), "segments"_a,
-           "length"_a, "offset"_a, "stiffness"_a, "max_tension"_a, "kinds"_a, "parameters"_a, "extents"_a,
+      .def(nb::init<int, double, double, double, double, const std::vector<double>&, int, const Kinds&, const Input&, const Input&, const Mask&>(), "segments"_a,
+           "length"_a, "offset"_a, "stiffness"_a, "max_tension"_a, "lines"_a, "between"_a, "kinds"_a, "parameters"_a, "extents"_a,
            "touchable"_a)
       .def_prop_ro("block_size", &Kernel::block_size, "Length of an equilibrium's block.")
       .def("step", &Kernel::step, "from_"_a, "target"_a, "to"_a,

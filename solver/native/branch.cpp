@@ -8,7 +8,10 @@ namespace ccr {
 using namespace limits;
 
 Branch::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles)
-    : newton_(robot, obstacles), points_(newton_.chain.points().size()) {
+    : newton_(robot, obstacles),
+      nodes_(robot.segments + 1),
+      levers_(robot.segments + 1),
+      points_(robot.points()) {
   present_.shear.resize(robot.segments);
   trial_ = present_;
 }
@@ -24,8 +27,10 @@ void Branch::load(const double* block) {
   tension_ = block[1];
   block += 3;
   for (Control& shear : present_.shear) shear[0] = *block++;
-  for (std::size_t i = 0; i <= n; ++i, block += 3) points_[i] = {{block[0], block[1]}};
-  for (std::size_t i = 0; i <= n; ++i, block += 2) points_[n + 1 + i] = {{block[0], block[1]}};
+  for (std::size_t i = 0; i <= n; ++i) nodes_[i] = {{block[3 * i], block[3 * i + 1]}};
+  block += 3 * (n + 1);
+  for (std::size_t i = 0; i <= n; ++i, block += 2) levers_[i] = {{block[0] - nodes_[i][0], block[1] - nodes_[i][1]}};
+  place_points(newton_.chain.robot(), nodes_, levers_, points_);
   present_.active.count = 0;
   for (int c = 0; c < newton_.chain.contacts(); ++c)
     if (block[c] > 0 && present_.active.count < kMaxActive) {
@@ -43,7 +48,8 @@ void Branch::store(double* block) const {
   *block++ = chain.objective();
   for (const Control& shear : present_.shear) *block++ = shear[0];
   for (const State& state : chain.states()) block = std::copy(state.v.begin(), state.v.end(), block);
-  for (std::size_t i = 0; i <= n; ++i) block = std::copy_n(chain.points()[n + 1 + i].v.begin(), 2, block);
+  for (std::size_t i = 0; i <= n; ++i)
+    for (int k = 0; k < 2; ++k) *block++ = chain.states()[i][k] + chain.levers()[i][k];
   std::fill_n(block, chain.contacts(), 0.0);
   for (int j = 0; j < present_.active.count; ++j) block[present_.active.contact[j]] = present_.active.multiplier[j];
   block += chain.contacts();
@@ -76,9 +82,9 @@ void Branch::settle() {
 // Whether every point came here from the last accepted shape without cutting through an obstacle or jumping.
 bool Branch::passable(double allowed) const {
   const Chain& chain = newton_.chain;
-  const int nodes = chain.robot().segments + 1;
+  const int points = chain.robot().points();
   double farthest = 0;
-  for (int k = 0; k < kPoints * nodes; ++k) {
+  for (int k = 0; k < points; ++k) {
     const double dx = chain.points()[k][0] - points_[k][0], dy = chain.points()[k][1] - points_[k][1];
     farthest = std::max(farthest, dx * dx + dy * dy);
   }
@@ -86,8 +92,8 @@ bool Branch::passable(double allowed) const {
   farthest = std::sqrt(farthest);
   for (const Obstacle& obstacle : chain.obstacles()) {
     if (farthest <= kSweepStride * obstacle.fineness) continue;
-    for (int k = 0; k < kPoints * nodes; ++k)
-      if (obstacle.touchable[k % nodes] && !passes(obstacle, points_[k], chain.points()[k])) return false;
+    for (int k = 0; k < points; ++k)
+      if (obstacle.touchable[k] && !passes(obstacle, points_[k], chain.points()[k])) return false;
   }
   return true;
 }

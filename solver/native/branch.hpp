@@ -47,7 +47,8 @@ class Branch {
   Newton newton_;
   Iterate present_, trial_;
   double tension_ = 0, trial_tension_ = 0;
-  std::vector<Position> points_;  // of `present_`
+  std::vector<Position> nodes_, levers_;  // of the block last read
+  std::vector<Position> points_;          // of `present_`
   bool settled_ = false;          // whether the chain is evaluated at `present_`
 };
 

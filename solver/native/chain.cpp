@@ -14,22 +14,43 @@ double moment(const State& adjoint, const Bend& bend) { return adjoint[1] * bend
 
 }  // namespace
 
+void place_points(const Robot& robot, std::span<const Position> nodes, std::span<const Position> levers,
+                  std::vector<Position>& points) {
+  const int stride = robot.between + 1;
+  Position* point = points.data();
+  for (const double line : robot.lines) {
+    const double scale = line / robot.offset;
+    for (int i = 0; i <= robot.segments; ++i)
+      point[i * stride] = {{nodes[i][0] + scale * levers[i][0], nodes[i][1] + scale * levers[i][1]}};
+    for (int i = 0; i < robot.segments; ++i)
+      for (int k = 1; k < stride; ++k) {
+        const Position &here = point[i * stride], &next = point[(i + 1) * stride];
+        const double t = static_cast<double>(k) / stride;
+        point[i * stride + k] = {{here[0] + t * (next[0] - here[0]), here[1] + t * (next[1] - here[1])}};
+      }
+    point += robot.positions();
+  }
+}
+
 Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
     : robot_(robot),
       obstacles_(obstacles),
       bends_(robot.segments),
       states_(robot.segments + 1),
+      nodes_(robot.segments + 1),
       levers_(robot.segments + 1),
-      points_(kPoints * (robot.segments + 1)),
+      points_(robot.points()),
       gaps_(obstacles.size() * points_.size(), std::numeric_limits<double>::infinity()),
       pulls_(robot.segments + 1),
       adjoints_(robot.segments),
       gradient_(robot.segments) {
   near_.reserve(gaps_.size());
-  for (int c = 0; c < contacts(); ++c) {
-    const int points = kPoints * (robot.segments + 1);
-    sites_.push_back({c / points, c % points, c % (robot.segments + 1)});
-  }
+  const int stride = robot.between + 1;
+  for (const double line : robot.lines)
+    for (int k = 0; k < robot.positions(); ++k)
+      sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line / robot.offset});
+  for (const double line : robot.lines) reach_ = std::max(reach_, std::abs(line));
+  reach_ += limits::kReach + (robot.between > 0 ? robot.length : 0);
 }
 
 bool Chain::evaluate(const std::vector<Control>& shear, double cable) {
@@ -51,49 +72,55 @@ bool Chain::evaluate(const std::vector<Control>& shear, double cable) {
     steepest_ = std::max(steepest_, std::abs(2 * bend.angle * bend.slope));
   }
   if (!std::isfinite(objective_)) return false;
-  for (int i = 0; i <= n; ++i) {
-    points_[i] = {{states_[i][0], states_[i][1]}};
-    points_[n + 1 + i] = {{states_[i][0] + levers_[i][0], states_[i][1] + levers_[i][1]}};
-  }
+  for (int i = 0; i <= n; ++i) nodes_[i] = {{states_[i][0], states_[i][1]}};
+  place_points(robot_, nodes_, levers_, points_);
   measure_gaps();
   return true;
 }
 
 // Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
 void Chain::measure_gaps() {
-  const int nodes = robot_.segments + 1;
+  const int n = robot_.segments, stride = robot_.between + 1;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
-  for (std::size_t j = 0; j < obstacles_.size(); ++j)
-    for (int i = 0; i < nodes; ++i) {
-      const double distance = clearance(obstacles_[j], points_[i]) - robot_.offset - limits::kReach;
+  int first = 0;  // contact of the obstacle
+  for (const Obstacle& obstacle : obstacles_) {
+    for (int i = 0; i <= n; ++i) {
+      const double distance = clearance(obstacle, nodes_[i]) - reach_;
       if (distance > 0) {
-        i += static_cast<int>(std::min(distance / robot_.length, static_cast<double>(nodes)));
+        i += static_cast<int>(std::min(distance / robot_.length, static_cast<double>(n)));
         continue;
       }
-      if (!obstacles_[j].touchable[i]) continue;
-      for (int point = 0; point < kPoints; ++point) {
-        const int contact = (static_cast<int>(j) * kPoints + point) * nodes + i;
-        gaps_[contact] = ccr::measure_gap(obstacles_[j], this->point(contact)).value;
-        near_.push_back(contact);
-      }
+      for (int start = i * stride; start < robot_.points(); start += robot_.positions())
+        for (int k = start; k < start + (i < n ? stride : 1); ++k) {
+          if (!obstacle.touchable[k]) continue;
+          gaps_[first + k] = measure_gap(obstacle, points_[k]).value;
+          near_.push_back(first + k);
+        }
     }
+    first += robot_.points();
+  }
 }
 
 void Chain::survey(double* gaps) const {
-  const std::size_t nodes = robot_.segments + 1;
   for (const Obstacle& obstacle : obstacles_) {
     ccr::measure_gaps(obstacle, points_, gaps);
     for (std::size_t k = 0; k < points_.size(); ++k)
-      if (!obstacle.touchable[k % nodes]) gaps[k] = std::numeric_limits<double>::infinity();
+      if (!obstacle.touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
     gaps += points_.size();
   }
 }
 
-State Chain::slope(int contact) const {
-  const Gap law = ccr::measure_gap(obstacle(contact), point(contact));
-  const Position lever = this->lever(contact);
-  return {{law.x, law.y, law.y * lever[0] - law.x * lever[1]}};
+System::Force Chain::slope(int contact) const {
+  const Gap gap = measure_gap(obstacle(contact), point(contact));
+  const Site& site = this->site(contact);
+  const auto share = [&](double weight, const Position& lever) {
+    const double turn = site.lever * (gap.y * lever[0] - gap.x * lever[1]);
+    return State{{weight * gap.x, weight * gap.y, weight * turn}};
+  };
+  const double t = site.fraction;
+  if (t == 0) return {site.node, false, share(1, levers_[site.node]), {}};
+  return {site.node, true, share(1 - t, levers_[site.node]), share(t, levers_[site.node + 1])};
 }
 
 double Chain::violation() const {
@@ -105,8 +132,11 @@ double Chain::violation() const {
 void Chain::reduced_gradient(const ActiveSet& active) {
   std::fill(pulls_.begin(), pulls_.end(), State{});
   for (int j = 0; j < active.count; ++j) {
-    const State force = slope(active.contact[j]);
-    for (int k = 0; k < 3; ++k) pulls_[node(active.contact[j])][k] += active.multiplier[j] * force[k];
+    const System::Force force = slope(active.contact[j]);
+    for (int k = 0; k < 3; ++k) {
+      pulls_[force.node][k] += active.multiplier[j] * force.here[k];
+      if (force.split) pulls_[force.node + 1][k] += active.multiplier[j] * force.next[k];
+    }
   }
   State p;
   for (int i = robot_.segments - 1; i >= 0; --i) {
@@ -138,13 +168,25 @@ void Chain::curvature(const ActiveSet& active, System& system) const {
   system.node_hessian[robot_.segments] = {};
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
-    const Gap law = ccr::measure_gap(obstacle(contact), point(contact));
-    const Position lever = this->lever(contact);
-    const double tx = -lever[1], ty = lever[0];  // point motion per disk turn
-    const double mixed_x = law.xx * tx + law.xy * ty, mixed_y = law.xy * tx + law.yy * ty;
-    const double turn = tx * mixed_x + ty * mixed_y - law.x * lever[0] - law.y * lever[1];
-    const Mat<3, 3> hessian = {{law.xx, law.xy, mixed_x, law.xy, law.yy, mixed_y, mixed_x, mixed_y, turn}};
-    for (int k = 0; k < 9; ++k) system.node_hessian[node(contact)][k] -= active.multiplier[j] * hessian[k];
+    const Gap gap = measure_gap(obstacle(contact), point(contact));
+    const Site& site = this->site(contact);
+    // Its Hessian in the states of the nodes beside it: J_aᵀ C J_b, and the curvature of the turn of each lever.
+    const auto motion = [&](double weight, const Position& lever) {
+      return Mat<2, 3>{{weight, 0, -weight * site.lever * lever[1], 0, weight, weight * site.lever * lever[0]}};
+    };
+    const auto turn = [&](double weight, const Position& lever) {
+      return weight * site.lever * (gap.x * lever[0] + gap.y * lever[1]);
+    };
+    const double t = site.fraction, force = -active.multiplier[j];
+    const Mat<2, 2> c = {{force * gap.xx, force * gap.xy, force * gap.xy, force * gap.yy}};
+    const Mat<2, 3> here = motion(1 - t, levers_[site.node]);
+    system.node_hessian[site.node] += transpose_times(here, times(c, here));
+    system.node_hessian[site.node](2, 2) -= force * turn(1 - t, levers_[site.node]);
+    if (t == 0) continue;
+    const Mat<2, 3> next = motion(t, levers_[site.node + 1]);
+    system.node_hessian[site.node + 1] += transpose_times(next, times(c, next));
+    system.node_hessian[site.node + 1](2, 2) -= force * turn(t, levers_[site.node + 1]);
+    system.couple(site.node, transpose_times(here, times(c, next)));
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "limits.hpp"
@@ -18,9 +19,12 @@ struct Robot {
   double offset;       // cable from backbone [mm]
   double stiffness;    // EI / 2 l0 [N mm]
   double max_tension;  // [N]
-};
+  std::vector<double> lines;  // distance of each line of points that can touch, from the backbone towards the cable [mm]
+  int between;                // points of a line between two nodes
 
-enum Point { kBackbone, kCable, kPoints };
+  int positions() const { return segments * (between + 1) + 1; }  // of a line
+  int points() const { return static_cast<int>(lines.size()) * positions(); }
+};
 
 using State = Vec<3>;    // x, y, disk angle
 using Control = Vec<1>;  // sine of the shear angle
@@ -50,7 +54,7 @@ Mat<3, C> transpose_times(const Turn& a, Mat<3, C> m) {
 
 using System = Riccati<3, 1, Turn>;
 
-// Contacts that carry a multiplier. A contact is (obstacle * kPoints + point) * (n+1) + node.
+// Contacts that carry a multiplier. A contact is (obstacle * lines + line) * positions + position.
 struct ActiveSet {
   int count = 0;
   std::array<int, limits::kMaxActive> contact;
@@ -64,6 +68,10 @@ struct ActiveSet {
     }
   }
 };
+
+// The points of all lines, from backbone points and levers of the nodes.
+void place_points(const Robot& robot, std::span<const Position> nodes, std::span<const Position> levers,
+                  std::vector<Position>& points);
 
 class Chain {
  public:
@@ -81,43 +89,43 @@ class Chain {
   const Robot& robot() const { return robot_; }
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
   int contacts() const { return static_cast<int>(gaps_.size()); }
-  int node(int contact) const { return sites_[contact].node; }
 
   double objective() const { return objective_; }
   double violation() const;  // largest -gap, at least 0
   double steepest() const { return steepest_; }  // largest slope of the objective alone
   double free_angle() const { return pull_ / robot_.offset; }
   const std::vector<State>& states() const { return states_; }
-  const std::vector<Position>& points() const { return points_; }  // (point, node)
+  const std::vector<Position>& levers() const { return levers_; }  // cable point from its backbone point
+  const std::vector<Position>& points() const { return points_; }  // (line, position)
   // Contacts within reach, and the gap of every contact, infinite for those that are not.
   const std::vector<int>& near() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
   void survey(double* gaps) const;  // of every contact, whether within reach or not
-  State slope(int contact) const;  // of a gap with respect to the state of its node
+  System::Force slope(int contact) const;  // of a gap with respect to the states of the nodes beside it
   const std::vector<Control>& gradient() const { return gradient_; }
 
  private:
-  // What a contact index stands for.
+  // Where a point is: this fraction of the way from a node to the next, beside the backbone by a multiple of the lever.
   struct Site {
-    int obstacle, point, node;  // point: (point, node) as one index
+    int node;
+    double fraction, lever;
   };
 
-  const Obstacle& obstacle(int contact) const { return obstacles_[sites_[contact].obstacle]; }
-  const Position& point(int contact) const { return points_[sites_[contact].point]; }
-  Position lever(int contact) const {
-    const Site& site = sites_[contact];
-    return site.point == site.node ? Position{} : levers_[site.node];
-  }
+  const Obstacle& obstacle(int contact) const { return obstacles_[contact / points_.size()]; }
+  const Position& point(int contact) const { return points_[contact % points_.size()]; }
+  const Site& site(int contact) const { return sites_[contact % points_.size()]; }
   void measure_gaps();
 
   Robot robot_;
   std::vector<Obstacle> obstacles_;
+  double reach_ = 0;  // from a node, within which its points may be near an obstacle
   double pull_ = 0, objective_ = 0, steepest_ = 0;
   std::vector<Bend> bends_;
   std::vector<State> states_;
-  std::vector<Position> levers_;  // cable point from its backbone point
+  std::vector<Position> nodes_;
+  std::vector<Position> levers_;
   std::vector<Position> points_;
-  std::vector<Site> sites_;
+  std::vector<Site> sites_;  // of the points
   std::vector<double> gaps_;
   std::vector<int> near_;
   std::vector<State> pulls_;     // Σ λ ∇c at each node

@@ -20,7 +20,7 @@ Contacts::Contacts(int segments)
 
 System::Load Contacts::load(const Chain& chain, int contact, int j) {
   slopes_[j] = chain.slope(contact);
-  return {nullptr, chain.node(contact), slopes_[j], responses_[j].shear.data(), responses_[j].states.data()};
+  return {nullptr, slopes_[j], responses_[j].shear.data(), responses_[j].states.data()};
 }
 
 // What the penalty on the active gaps adds to a step while they are not closed.
@@ -38,10 +38,10 @@ void Contacts::release(ActiveSet& active, int j, int responses) {
 }
 
 // Cholesky factor of ∇cᵀH⁻¹∇c over the active gaps; false where they depend on each other.
-bool Contacts::factor(const Chain& chain, const ActiveSet& active) {
+bool Contacts::factor(const ActiveSet& active) {
   for (int j = 0; j < active.count; ++j)
     for (int i = j; i < active.count; ++i) {
-      const double entry = along(chain, active.contact[i], i, responses_[j]);
+      const double entry = along(i, responses_[j]);
       double sum = entry;
       for (int k = 0; k < j; ++k) sum -= gram_[i][k] * gram_[j][k];
       if (i == j && !(sum > kDependent * entry)) return false;
@@ -65,7 +65,7 @@ void Contacts::apply_inverse(int count, Column& x) const {
 Contacts::Column Contacts::closing(const Chain& chain, const ActiveSet& active, const Direction& step) const {
   Column change;
   for (int j = 0; j < active.count; ++j)
-    change[j] = -chain.gaps()[active.contact[j]] - along(chain, active.contact[j], j, step);
+    change[j] = -chain.gaps()[active.contact[j]] - along(j, step);
   apply_inverse(active.count, change);
   return change;
 }
@@ -82,7 +82,7 @@ void Contacts::settle(const Chain& chain, ActiveSet& active, Direction& step) {
   while (active.count > 0) {
     int lowest;
     const auto begin = active.multiplier.begin(), end = begin + active.count;
-    if (factor(chain, active)) {
+    if (factor(active)) {
       const Column change = closing(chain, active, step);
       lowest = 0;
       for (int j = 1; j < active.count; ++j)
@@ -109,11 +109,11 @@ bool Contacts::admit(const Chain& chain, System& system, int contact, ActiveSet&
   for (;;) {
     const int count = active.count;
     const Direction& response = responses_[count];
-    if (!factor(chain, active)) return false;
+    if (!factor(active)) return false;
     Column coupling, trade;
-    for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(chain, active.contact[j], j, response);
+    for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(j, response);
     apply_inverse(count, trade);
-    const double full = along(chain, contact, count, response);
+    const double full = along(count, response);
     double curvature = full;
     for (int j = 0; j < count; ++j) curvature -= coupling[j] * trade[j];
 
@@ -124,7 +124,7 @@ bool Contacts::admit(const Chain& chain, System& system, int contact, ActiveSet&
         to_release = active.multiplier[j] / trade[j];
         blocking = j;
       }
-    const double shortfall = -chain.gaps()[contact] - along(chain, contact, count, step);
+    const double shortfall = -chain.gaps()[contact] - along(count, step);
     const double to_close = curvature > kDependent * full ? shortfall / curvature : kNever;
     const double length = std::min(to_release, to_close);
     if (!(length < kNever)) return false;
@@ -154,7 +154,7 @@ int Contacts::most_violated(const Chain& chain, const ActiveSet& active, const D
   for (const int c : chain.near()) {
     const double gap = chain.gaps()[c];
     if (gap > 2 * reach) continue;
-    const double predicted = gap + dot(chain.slope(c), step.states[chain.node(c)]);
+    const double predicted = gap + chain.slope(c).along(step.states);
     const auto end = active.contact.begin() + active.count;
     if (predicted < lowest && std::find(active.contact.begin(), end, c) == end) {
       lowest = predicted;
@@ -169,7 +169,7 @@ bool Contacts::solve(const Chain& chain, System& system, const Control* slope, c
   int count = 0;
   for (; count < active.count; ++count) loads_[count] = load(chain, active.contact[count], count);
   if (slope) {
-    loads_[count++] = {slope, 0, {}, step.shear.data(), step.states.data()};
+    loads_[count++] = {slope, {}, step.shear.data(), step.states.data()};
   } else {
     std::fill(step.shear.begin(), step.shear.end(), Control{});
     std::fill(step.states.begin(), step.states.end(), State{});
@@ -187,10 +187,10 @@ bool Contacts::solve(const Chain& chain, System& system, const Control* slope, c
 
 bool Contacts::correct(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
                        ActiveSet& active, Direction& step) {
-  const System::Load load{slope, 0, {}, step.shear.data(), step.states.data()};
+  const System::Load load{slope, {}, step.shear.data(), step.states.data()};
   system.respond({&load, 1});
   penalize(chain, penalty, active, step);
-  if (!factor(chain, active)) return false;
+  if (!factor(active)) return false;
   push(closing(chain, active, step), active, step);
   const auto end = active.multiplier.begin() + active.count;
   return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });

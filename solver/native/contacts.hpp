@@ -35,13 +35,13 @@ class Contacts {
  private:
   using Column = std::array<double, limits::kMaxActive>;
 
-  double along(const Chain& chain, int contact, int j, const Direction& d) const {
-    return dot(slopes_[j], d.states[chain.node(contact)]);
+  double along(int j, const Direction& d) const {
+    return slopes_[j].along(d.states);
   }
   System::Load load(const Chain& chain, int contact, int j);
   void penalize(const Chain& chain, const std::vector<double>& penalty, const ActiveSet& active, Direction& step) const;
   void release(ActiveSet& active, int j, int responses);
-  bool factor(const Chain& chain, const ActiveSet& active);
+  bool factor(const ActiveSet& active);
   void apply_inverse(int count, Column& x) const;
   void settle(const Chain& chain, ActiveSet& active, Direction& step);
   Column closing(const Chain& chain, const ActiveSet& active, const Direction& step) const;
@@ -50,7 +50,7 @@ class Contacts {
   int most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const;
 
   // Of the active gaps in their order, then of one that is being admitted.
-  std::vector<State> slopes_;
+  std::vector<System::Force> slopes_;
   std::vector<Direction> responses_;  // H⁻¹∇c
   std::vector<System::Load> loads_;
   std::array<Column, limits::kMaxActive> gram_;

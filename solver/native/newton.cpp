@@ -49,13 +49,20 @@ bool Newton::convexify(const ActiveSet& active) {
 void Newton::shape_system(const ActiveSet& active, double strength) {
   chain.curvature(active, system_);
   for (int j = 0; j < active.count; ++j) {
-    const int node = chain.node(active.contact[j]);
-    const double reach = chain.robot().length * node;
+    const System::Force slope = chain.slope(active.contact[j]);
+    const double reach = chain.robot().length * (slope.node + slope.split);
     penalty_[j] = strength / (reach * reach);
     if (strength == 0) continue;
-    const State slope = chain.slope(active.contact[j]);
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) system_.node_hessian[node](r, c) += penalty_[j] * slope[r] * slope[c];
+    const auto outer = [&](const State& a, const State& b) {
+      Mat<3, 3> product;
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) product(r, c) = penalty_[j] * a[r] * b[c];
+      return product;
+    };
+    system_.node_hessian[slope.node] += outer(slope.here, slope.here);
+    if (!slope.split) continue;
+    system_.node_hessian[slope.node + 1] += outer(slope.next, slope.next);
+    system_.couple(slope.node, outer(slope.here, slope.next));
   }
 }
 
@@ -107,7 +114,7 @@ double Newton::search(const Iterate& at, const ActiveSet& target, double& weight
   for (std::size_t i = 0; i < step_.shear.size(); ++i) slope += chain.gradient()[i][0] * step_.shear[i][0];
   for (int j = 0; j < at.active.count; ++j)
     slope += at.active.multiplier[j] *
-             dot(chain.slope(at.active.contact[j]), step_.states[chain.node(at.active.contact[j])]);
+             chain.slope(at.active.contact[j]).along(step_.states);
   for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
   const double before = merit(weight);
   const double expected = std::min(slope - (before - chain.objective()), 0.0);

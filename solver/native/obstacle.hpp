@@ -21,7 +21,7 @@ struct Obstacle {
   Position center;                       // of a disc that holds it
   double radius;                         // of that disc; infinite for a half-plane
   double fineness;                       // smallest radius of its surface; infinite for a half-plane
-  std::vector<unsigned char> touchable;  // (n+1): whether a node can touch it
+  std::vector<unsigned char> touchable;  // (lines, positions): whether a point can touch it
 };
 
 struct Gap {

@@ -30,6 +30,16 @@ class Riccati {
   std::vector<Stage> stages;
   std::vector<Mat<NX, NX>> node_hessian;  // curvature in the state of each node
 
+  // Adds curvature in the state of a node (rows) and that of the next (columns).
+  void couple(int node, const Mat<NX, NX>& cross) {
+    const Mat<NX, NX> along = times(cross, stages[node].a);
+    for (int r = 0; r < NX; ++r)
+      for (int c = 0; c < NX; ++c) node_hessian[node](r, c) += along(r, c) + along(c, r);
+    const Mat<NX, NU> turned = times(cross, stages[node].b);
+    for (int r = 0; r < NX; ++r)
+      for (int c = 0; c < NU; ++c) stages[node].hux(c, r) += turned(r, c);
+  }
+
   // True exactly when the reduced Hessian (plus damping on the controls) is positive definite.
   bool factor(double damping) {
     Mat<NX, NX> p;
@@ -52,11 +62,21 @@ class Riccati {
     return true;
   }
 
-  // Something to respond to, a slope of the controls or a force on one node, and where its response goes.
+  // A force on a node and one on the next.
+  struct Force {
+    int node;
+    bool split;  // whether there is one on the next
+    Vec<NX> here, next;
+
+    double along(const std::vector<Vec<NX>>& states) const {
+      return dot(here, states[node]) + (split ? dot(next, states[node + 1]) : 0.0);
+    }
+  };
+
+  // Something to respond to, a slope of the controls or a force, and where its response goes.
   struct Load {
     const Vec<NU>* slope;  // (n) or null
-    int node;              // used where slope is null
-    Vec<NX> force;
+    Force force;           // used where slope is null
     Vec<NU>* du;  // (n)
     Vec<NX>* dx;  // (n+1)
   };
@@ -68,7 +88,11 @@ class Riccati {
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
       const Stage& s = stages[i];
       for (std::size_t k = 0; k < loads.size(); ++k) {
-        if (!loads[k].slope && loads[k].node == i + 1) v[k] -= loads[k].force;
+        if (!loads[k].slope) {
+          const Force& force = loads[k].force;
+          if (force.node == i + 1) v[k] -= force.here;
+          if (force.node == i && force.split) v[k] -= force.next;
+        }
         Vec<NU> h = transpose_times(s.b, v[k]);
         if (loads[k].slope) h += loads[k].slope[i];
         v[k] = transpose_times(s.a, v[k]);

@@ -53,16 +53,16 @@ def clearance(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
     return np.min([obstacle.gap(points) for obstacle in scene if obstacle.nodes is None], axis=(0, 2))
 
 
-def random_shape(generator: np.random.Generator) -> Obstacle:
-    """Any kind of obstacle in front of the robot; straight ones clear of the unactuated robot."""
+def random_shape(generator: np.random.Generator, thinnest: float) -> Obstacle:
+    """Any kind of obstacle in front of the robot, none thinner than ``thinnest`` from its middle."""
     x, y = generator.uniform((40, 75), (75, 150))
-    axis, across, along = generator.normal(size=2), generator.uniform(6, 12), generator.uniform(6, 20)
+    axis, across, along = generator.normal(size=2), generator.uniform(thinnest, 12), generator.uniform(thinnest, 20)
     axis /= np.linalg.norm(axis)
     match generator.integers(5):
         case 0:
             return Circle(center=(x, y), radius=across)
         case 1:
-            return Ellipse(center=(x, y), radii=(across + 3, along), axis=tuple(axis))
+            return Ellipse(center=(x, y), radii=(across + 1, along), axis=tuple(axis))
         case 2:
             return Capsule(start=tuple((x, y) - along * axis), end=tuple((x, y) + along * axis), radius=across)
         case 3:
@@ -74,10 +74,10 @@ def random_shape(generator: np.random.Generator) -> Obstacle:
             return HalfPlane(point=(x, y), normal=(-1, generator.uniform(-1, 1)))
 
 
-def random_shapes(generator: np.random.Generator) -> Scene:
+def random_shapes(generator: np.random.Generator, thinnest: float = 6) -> Scene:
     """One to four obstacles of any kind that leave the unactuated robot free."""
     while True:
-        scene = Scene(random_shape(generator) for _ in range(generator.integers(1, 5)))
+        scene = Scene(random_shape(generator, thinnest) for _ in range(generator.integers(1, 5)))
         if clearance(np.zeros((1, 19, 3)) + [[0, 10 * k, 0] for k in range(19)], Robot.prototype(), scene).min() > 1:
             return scene
 

@@ -131,7 +131,7 @@ def test_an_equilibrium_serves_equal_solvers():
 
 def test_far_obstacles_change_nothing(circles):
     """Those out of reach are passed over on the way, and measured in the answer."""
-    near, far = BLOCKING[:1], [(60 + 12 * k, -30 - 5 * k, 4.0) for k in range(31)]
+    near, far = BLOCKING[:1], [(60 + 12 * k, -30 - 5 * k, 5.0) for k in range(31)]
     alone, crowded = (Solver(Robot.prototype(), circles(*obstacles)) for obstacles in (near, (*near, *far)))
     one, many = alone.rest(), crowded.rest()
     for cable in (4.0, 8.0, 11.0, 9.0):
@@ -141,3 +141,35 @@ def test_far_obstacles_change_nothing(circles):
         assert np.array_equal(one.multipliers[0], many.multipliers[0])
         points = np.stack([many.nodes[:, :2], many.cable_nodes])
         assert many.gaps == pytest.approx(np.array([obstacle.gap(points) for obstacle in many.scene]), rel=1e-12)
+
+
+@pytest.mark.parametrize("touch", [("backbone", "cable"), ("backbone", "cable", "rim")])
+@pytest.mark.parametrize("place", [(30, 120), (45, 150), (60, 110), (24, 70)])
+def test_a_thin_peg_does_not_slip_between_nodes(place, touch, circles, pulls, swept):
+    peg = circles((*place, 0.5))
+    coarse = {"length_mm": 180.0, "segments": 10, "offset_mm": 8.0, "touch": touch}
+    with pytest.raises(ValueError, match=r"1 mm wide and could slip between points 18 mm apart; .* between=17"):
+        Solver(Robot(**coarse), peg)
+    robot = Robot(**coarse, between=29)
+    solver = Solver(robot, peg)
+    equilibrium, touched = solver.rest(), False
+    for cable in [*pulls(14.0, 0.5), *(14.0 - np.array(list(pulls(10.0, 0.5))))]:
+        shapes = solver.trace(equilibrium, cable)
+        equilibrium = solver.step(equilibrium, cable)
+        touched |= equilibrium.contact.any()
+        assert equilibrium.status in (Status.CONVERGED, Status.SNAPPED, Status.STALLED)
+        assert equilibrium.gaps.min() >= -1e-6
+        assert not swept(shapes, robot, peg).any()
+        assert certified(equilibrium)
+    assert touched
+
+
+def test_lines_that_touch():
+    """Gaps of a wall 20 mm behind the straight robot, to each line of points alone."""
+    wall = Scene([HalfPlane(point=(-20, 0), normal=(1, 0))])
+    for line, gap in (("backbone", 20.0), ("cable", 28.0), ("rim", 12.0)):
+        robot = Robot(length_mm=180, segments=18, offset_mm=8, touch=(line,), between=2)
+        rest = Solver(robot, wall).rest()
+        assert rest.gaps.shape == (1, 1, 55)
+        assert rest.gaps == pytest.approx(gap)
+        assert rest.points[0, :, 1] == pytest.approx(np.linspace(0, 180, 55))

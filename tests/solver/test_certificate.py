@@ -1,13 +1,16 @@
 """Every equilibrium is a KKT point of eq. 5, and the one the reference solver finds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
 from solver.formulation import GAP_LAWS
+from solver.robot import LINES
 
 obstacles = st.builds(
     lambda x, y, r: Circle(center=(x, y), radius=r), st.floats(35, 75), st.floats(75, 150), st.floats(10, 16)
@@ -29,11 +32,12 @@ def test_residuals(scene, start, changes):
     certify(follow(Solver(Robot.prototype(), scene), [start, *changes]))
 
 
-def test_residuals_of_every_shape(random_shapes):
-    generator, touched = np.random.default_rng(3), set()
+@pytest.mark.parametrize("touch", [{}, {"touch": LINES, "between": 3}], ids=["paper", "everywhere"])
+def test_residuals_of_every_shape(random_shapes, touch):
+    robot, generator, touched = replace(Robot.prototype(), **touch), np.random.default_rng(3), set()
     for _ in range(60):
         scene = random_shapes(generator)
-        states = list(follow(Solver(Robot.prototype(), scene), generator.uniform(-0.2, 0.6, 40)))
+        states = list(follow(Solver(robot, scene), generator.uniform(-0.2, 0.6, 40)))
         certify(states)
         touched |= {scene.kinds[j] for state in states for j in state.contact.any(axis=(1, 2)).nonzero()[0]}
     assert touched == set(GAP_LAWS)

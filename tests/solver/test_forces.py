@@ -51,7 +51,7 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(scene):
     parameters = [equilibrium.cable_mm, robot.length_mm, robot.offset_mm]
     parameters += [value for obstacle in scene for value in obstacle.parameters]
     unknowns = np.concatenate([equilibrium.nodes[1:, :2].ravel(), equilibrium.cable_nodes[1:].ravel()])
-    slope, _, equalities, _, gaps = (v.full() for v in node_derivatives(n, scene.kinds)(unknowns, parameters))
+    slope, _, equalities, _, gaps = (v.full() for v in node_derivatives(robot, scene.kinds)(unknowns, parameters))
     # Admissible: backbone and disks keep their lengths, cable segments shorten by 1/n each.
     shortening = np.zeros(3 * n)
     shortening[n : 2 * n] = -1.0 / n

@@ -89,15 +89,19 @@ def test_gap_on_the_outline(obstacle):
     assert obstacle.gap(outline) == pytest.approx(0, abs=1e-12)
     assert np.linalg.norm(slopes, axis=-1) == pytest.approx(1, abs=1e-12)
     assert obstacle.gap(outline + 0.1 * slopes) == pytest.approx(0.1, abs=0.005)
-    center, radius, fineness = obstacle.extent
+    center, radius, width, fineness = obstacle.extent
     assert np.linalg.norm(outline - center, axis=-1).max() <= radius * (1 + 1e-12)
     assert 0 < fineness <= radius
+    if len(outline) > 1:
+        angles = np.linspace(0, np.pi, 2000)
+        spans = np.ptp(outline @ [np.cos(angles), np.sin(angles)], axis=0)
+        assert width == pytest.approx(spans.min(), rel=5e-3)
 
 
 def test_node_problem_at_a_solution(circles, pulls):
     robot = Robot.prototype()
     scene = circles((44, 104, 15), (70, 140, 10))
-    solver, problem = Solver(robot, scene), node_problem(robot.segments, scene.kinds)
+    solver, problem = Solver(robot, scene), node_problem(robot, scene.kinds)
     outputs = [problem.objective, problem.equalities, problem.gaps]
     evaluate = ca.Function("problem", [problem.unknowns, problem.parameters], outputs)
     equilibrium = solver.rest()

@@ -1,11 +1,14 @@
 """A long random walk among random obstacles: nothing fails, nothing is penetrated, nothing is crossed."""
 
 from collections import Counter
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from solver import Robot, Solver, Status
+from solver.robot import LINES
 
 STEPS_PER_SCENE = 100
 
@@ -18,12 +21,14 @@ def walk(solver, changes):
     return states, commands
 
 
-@pytest.mark.parametrize("scenes", ["random_scene", "random_shapes"])
-def test_random_walk(pytestconfig, request, scenes, swept):
-    random_scene = request.getfixturevalue(scenes)
-    generator, robot, counts = np.random.default_rng(0), Robot.prototype(), Counter()
+@pytest.mark.parametrize("mix", ["circles", "shapes", "thin shapes"])
+def test_random_walk(pytestconfig, mix, random_scene, random_shapes, swept):
+    thin = mix == "thin shapes"
+    draw = random_scene if mix == "circles" else partial(random_shapes, thinnest=2 if thin else 6)
+    generator, counts = np.random.default_rng(0), Counter()
+    robot = replace(Robot.prototype(), touch=LINES, between=3) if thin else Robot.prototype()
     for _ in range(pytestconfig.getoption("soak") // STEPS_PER_SCENE):
-        scene = random_scene(generator)
+        scene = draw(generator)
         solver = Solver(robot, scene)
         states, commands = walk(solver, generator.uniform(-0.5, 0.5, STEPS_PER_SCENE) + 0.14)
         counts.update(state.status.name for state in states[1:])

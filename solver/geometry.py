@@ -1,0 +1,30 @@
+"""Points of a robot that can touch obstacles."""
+
+import numpy as np
+
+from solver.obstacles import Obstacle
+from solver.robot import Robot
+
+
+def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:
+    """The points of ``robot.touch``, ``(lines, positions, 2)`` [mm], of node poses ``(n+1, 3)``.
+
+    Those between two nodes divide the straight line between their points evenly.
+    """
+    disks = np.column_stack([np.cos(nodes[:, 2]), np.sin(nodes[:, 2])])
+    lines = nodes[:, :2] + np.array(robot.lines_mm)[:, None, None] * disks
+    place = np.arange(robot.positions) / (robot.between + 1)
+    node = np.minimum(place.astype(int), robot.segments - 1)
+    fraction = (place - node)[:, None]
+    return np.asarray((1 - fraction) * lines[:, node] + fraction * lines[:, node + 1])
+
+
+def touchable_points(robot: Robot, obstacle: Obstacle) -> np.ndarray:
+    """Which of these points can touch an obstacle, ``(lines, positions)`` bool: all, or those of its nodes.
+
+    Raises:
+        ValueError: If the obstacle names a node that the robot does not have.
+    """
+    touchable = np.full((len(robot.touch), robot.positions), obstacle.nodes is None)
+    touchable[:, :: robot.between + 1] = obstacle.touchable(robot.segments + 1)
+    return touchable
