@@ -114,22 +114,36 @@ class Equilibrium:
         """Which points touch which obstacle: a positive multiplier, ``(m, p, k)`` bool."""
         return self.multipliers > 0
 
+    def node_solution(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Unknowns, parameters and multipliers of :func:`solver.formulation.node_problem` at this equilibrium.
+
+        The multipliers are those of the equalities, by least squares, and of the gaps.
+        """
+        unknowns, parameters = self._node_point()
+        slope, _, equality_slopes, _, gap_slopes = self._node_derivatives(unknowns, parameters)
+        forces = self.multipliers[:, :, 1:].ravel()
+        balance = slope.ravel() - (gap_slopes.T @ forces if forces.size else 0.0)
+        return unknowns, parameters, np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0], forces
+
+    def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
+        shapes = [value for obstacle in self.scene for value in obstacle.parameters]
+        parameters = np.array([self.cable_mm, self.robot.length_mm, self.robot.offset_mm, *shapes])
+        return np.concatenate([self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel()]), parameters
+
+    def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
+        derivatives = node_derivatives(self.robot, self.scene.kinds)(unknowns, parameters)
+        return [value.full() for value in derivatives]
+
     def residuals(self) -> Residuals:
         """Recompute the optimality conditions of eq. 5 from the nodes and multipliers alone.
 
         The derivatives are those of the node-coordinate problem in :mod:`solver.formulation`, which shares nothing
         with the reduced coordinates that the solver works in.
         """
-        parameters = [self.cable_mm, self.robot.length_mm, self.robot.offset_mm]
-        parameters += [value for obstacle in self.scene for value in obstacle.parameters]
-        unknowns = np.concatenate([self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel()])
-        slope, lengths, equality_slopes, gaps, gap_slopes = (
-            value.full() for value in node_derivatives(self.robot, self.scene.kinds)(unknowns, parameters)
-        )
-        forces = self.multipliers[:, :, 1:].ravel()
+        unknowns, parameters, tensions, forces = self.node_solution()
+        slope, lengths, equality_slopes, gaps, gap_slopes = self._node_derivatives(unknowns, parameters)
         touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
         balance = slope.ravel() - (gap_slopes.T @ forces if forces.size else 0.0)
-        tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
         clearance = gaps.ravel()[touchable]
         return Residuals(
             stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),

@@ -236,3 +236,59 @@ def node_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
         ca.jacobian(problem.gaps, problem.unknowns),
     ]
     return ca.Function("node_derivatives", [problem.unknowns, problem.parameters], outputs)
+
+
+def moved_shape(kind: str, shape: ca.MX, motion: ca.MX) -> ca.MX:
+    """A shape turned about the origin, shifted and grown by ``motion = (x, y, turn, radius)`` [mm, mm, rad, mm]."""
+    cosine, sine = ca.cos(motion[2]), ca.sin(motion[2])
+    turn = ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
+
+    def place(points: ca.MX) -> ca.MX:
+        columns = ca.reshape(points, 2, -1)
+        return ca.vec(turn @ columns + ca.repmat(motion[:2], 1, columns.shape[1]))
+
+    match kind:
+        case "circle":
+            return ca.vertcat(place(shape[:2]), shape[2] + motion[3])
+        case "half_plane":
+            normal = turn @ shape[:2]
+            return ca.vertcat(normal, shape[2] + ca.dot(normal, motion[:2]) + motion[3])
+        case "ellipse":
+            return ca.vertcat(place(shape[:2]), shape[2:4] + motion[3], turn @ shape[4:])
+        case "capsule":
+            return ca.vertcat(place(shape[:4]), shape[4] + motion[3])
+        case "polygon":
+            return ca.vertcat(shape[0] + motion[3], place(shape[1:]))
+    raise ValueError(f"kind is {kind!r}; it must be one of {', '.join(GAP_LAWS)}")
+
+
+@lru_cache(maxsize=32)
+def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
+    """Derivatives of the optimality conditions of :func:`node_problem`.
+
+    With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian ``L = J − ν·equalities − λ·gaps``,
+    its conditions ``F = (L_z, equalities, gaps)`` and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``.
+    The slope of the loads in the multipliers stands in ``F_v`` already.
+    """
+    problem = node_problem(robot, kinds)
+    change = ca.MX.sym("change", 2 + 4 * len(kinds))
+    sizes = np.cumsum([3, *(GAP_LAWS[kind].size for kind in kinds)]).tolist()
+    shapes = [
+        moved_shape(kind, problem.parameters[start:end], change[2 + 4 * j : 6 + 4 * j])
+        for j, (kind, start, end) in enumerate(zip(kinds, sizes[:-1], sizes[1:], strict=True))
+    ]
+    changed = ca.vertcat(problem.parameters[:2] + change[:2], problem.parameters[2], *shapes)
+    terms = ca.Function("terms", [problem.unknowns, problem.parameters], problem[2:])
+    objective, equalities, gaps = terms(problem.unknowns, changed)
+    tensions, forces = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("forces", gaps.shape[0])
+    lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(forces, gaps)
+    loads = ca.gradient(lagrangian, change)
+    conditions = ca.vertcat(ca.gradient(lagrangian, problem.unknowns), equalities, gaps)
+    outputs = [
+        ca.jacobian(conditions, problem.unknowns),
+        ca.jacobian(conditions, change),
+        loads,
+        ca.jacobian(loads, change),
+    ]
+    outputs = [ca.substitute(output, change, ca.MX.zeros(change.shape)) for output in outputs]
+    return ca.Function("kkt_derivatives", [problem.unknowns, problem.parameters, tensions, forces], outputs)

@@ -1,0 +1,76 @@
+"""Steps of the solver that need not be computed twice."""
+
+from collections import OrderedDict
+from typing import NamedTuple
+
+from solver.equilibrium import Equilibrium
+from solver.solve import Solver
+
+
+class MemoStatistics(NamedTuple):
+    """Steps a :class:`TransitionMemo` knew and had to compute since it was cleared, steps it keeps, and their bound."""
+
+    hits: int
+    misses: int
+    size: int
+    capacity: int
+
+
+class TransitionMemo:
+    """Stands in for a solver and remembers its latest steps, for work that repeats them: resets, replays, planners.
+
+    A step is a function of the state's numbers and the command, and these are the key. Not to be shared by threads.
+
+    Args:
+        solver: Answers what is not known yet.
+        capacity: Steps to keep, about 3 kB each; the least recently used goes first.
+
+    Raises:
+        ValueError: If ``capacity`` is not a positive whole number.
+    """
+
+    def __init__(self, solver: Solver, capacity: int = 4096) -> None:
+        if not (isinstance(capacity, int) and capacity > 0):
+            raise ValueError(f"capacity is {capacity!r}; it must be a positive whole number")
+        self.robot, self.scene, self.rest = solver.robot, solver.scene, solver.rest
+        self._step = solver.step
+        self._capacity = capacity
+        self.clear()
+
+    def step(self, equilibrium: Equilibrium, cable_mm: float) -> Equilibrium:
+        """The solver's ``step``, bit for bit.
+
+        Args:
+            equilibrium: Where the robot is.
+            cable_mm: Commanded cable displacement [mm].
+
+        Returns:
+            The equilibrium reached, the same object while the step is remembered.
+
+        Raises:
+            ValueError: As the solver; the memo stays as it was.
+        """
+        robot, scene = equilibrium.robot, equilibrium.scene
+        if (robot is not self.robot and robot != self.robot) or (scene is not self.scene and scene != self.scene):
+            return self._step(equilibrium, cable_mm)
+        key = equilibrium.block.tobytes(), cable_mm
+        reached = self._reached.get(key)
+        if reached is not None:
+            self._reached.move_to_end(key)
+            self._hits += 1
+            return reached
+        reached = self._reached[key] = self._step(equilibrium, cable_mm)
+        self._misses += 1
+        if len(self._reached) > self._capacity:
+            self._reached.popitem(last=False)
+        return reached
+
+    def clear(self) -> None:
+        """Forget all steps and start the statistics anew."""
+        self._reached: OrderedDict[tuple[bytes, float], Equilibrium] = OrderedDict()
+        self._hits = self._misses = 0
+
+    @property
+    def statistics(self) -> MemoStatistics:
+        """Use since the memo was made or cleared."""
+        return MemoStatistics(self._hits, self._misses, len(self._reached), self._capacity)

@@ -1,0 +1,121 @@
+"""Sensitivities against central differences of the solver itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver
+from solver.forces import force_true
+from solver.robot import LINES
+from solver.sensitivity import CABLE, LENGTH, obstacle_rows, sensitivity
+
+ROBOT = Robot(length_mm=180, segments=18, offset_mm=8, touch=LINES, between=1, max_tension=100)
+PUSHED = [
+    Circle(center=(44, 104), radius=15),
+    Ellipse(center=(44, 104), radii=(15, 9), axis=(1, 2)),
+    Capsule(start=(40, 100), end=(52, 112), radius=8),
+    Polygon(corners=((36, 98), (52, 98), (52, 110), (40, 112)), radius=4),
+    HalfPlane(point=(31, 127), normal=(-1, 0.2), nodes=(14,)),
+]
+SCENES = [
+    *([obstacle] for obstacle in PUSHED),
+    [Circle(center=(33, 89), radius=12.5), Circle(center=(59, 140), radius=15)],
+]
+EVERY_SCENE = pytest.mark.parametrize("obstacles", SCENES, ids=lambda scene: "+".join(o.kind for o in scene))
+CABLE_MM, STEP = 9.0, 1e-4
+
+
+def solve(obstacles, cable=CABLE_MM, length=180.0):
+    """The equilibrium of a freshly pulled robot."""
+    solver = Solver(replace(ROBOT, length_mm=length), Scene(obstacles))
+    equilibrium = solver.rest()
+    for part in np.linspace(0, cable, 31)[1:]:
+        equilibrium = solver.step(equilibrium, part)
+    return equilibrium
+
+
+def outputs(equilibrium):
+    parts = equilibrium.nodes, 1e3 * equilibrium.multipliers, equilibrium.tension, force_true(equilibrium)
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
+def predicted(slopes, row):
+    parts = slopes.nodes[row], 1e3 * slopes.multipliers[row], slopes.tension[row], slopes.forces[row]
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
+def moved(obstacle, x=0.0, y=0.0, turn=0.0, growth=0.0):
+    """The obstacle shifted, turned about its centre and grown."""
+    centre, rotation = (
+        np.array(obstacle.extent.center),
+        np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]),
+    )
+    place = lambda point: tuple(centre + rotation @ (np.array(point) - centre) + (x, y))  # noqa: E731
+    match obstacle:
+        case Circle():
+            return replace(obstacle, center=place(obstacle.center), radius=obstacle.radius + growth)
+        case Ellipse():
+            radii, axis = tuple(np.array(obstacle.radii) + growth), tuple(rotation @ obstacle.axis)
+            return replace(obstacle, center=place(obstacle.center), radii=radii, axis=axis)
+        case Capsule():
+            ends = {"start": place(obstacle.start), "end": place(obstacle.end)}
+            return replace(obstacle, **ends, radius=obstacle.radius + growth)
+        case Polygon():
+            return replace(obstacle, corners=tuple(map(place, obstacle.corners)), radius=obstacle.radius + growth)
+        case HalfPlane():
+            normal = rotation @ obstacle.normal
+            return replace(obstacle, point=tuple(place(obstacle.point) + growth * normal), normal=tuple(normal))
+
+
+def compare(slopes, row, ahead, behind):
+    assert np.array_equal(ahead.contact, behind.contact)
+    difference = (outputs(ahead) - outputs(behind)) / (2 * STEP)
+    assert predicted(slopes, row) == pytest.approx(difference, rel=1e-5, abs=1e-9 + 1e-5 * np.abs(difference).max())
+
+
+@EVERY_SCENE
+def test_cable_and_length(obstacles):
+    equilibrium = solve(obstacles)
+    assert equilibrium.contact.any()
+    slopes = sensitivity(equilibrium)
+    compare(slopes, CABLE, solve(obstacles, CABLE_MM + STEP), solve(obstacles, CABLE_MM - STEP))
+    compare(slopes, LENGTH, solve(obstacles, length=180 + STEP), solve(obstacles, length=180 - STEP))
+
+
+@EVERY_SCENE
+@pytest.mark.parametrize("motion", range(4), ids=["x", "y", "turn", "growth"])
+def test_obstacles(obstacles, motion):
+    slopes = sensitivity(solve(obstacles))
+    for j in range(len(obstacles)):
+        both = []
+        for change in (STEP, -STEP):
+            arguments = [0.0] * 4
+            arguments[motion] = change
+            both.append(solve([moved(o, *arguments) if k == j else o for k, o in enumerate(obstacles)]))
+        compare(slopes, obstacle_rows(j).start + motion, *both)
+
+
+def test_free_robot():
+    solver = Solver(ROBOT, Scene())
+    ahead, here, behind = (solver.step(solver.rest(), cable) for cable in (5 + STEP, 5.0, 5 - STEP))
+    compare(sensitivity(here), CABLE, ahead, behind)
+
+
+def test_contact_about_to_open_is_taken_from_either_side():
+    """At the onset of contact the force grows on the pressed side only."""
+    solver = Solver(ROBOT, Scene([Circle(center=(44, 104), radius=15)]))
+    equilibrium = solver.step(solver.rest(), 3.0)
+    nearest = np.unravel_index(equilibrium.gaps.argmin(), equilibrium.gaps.shape)
+    pressed = np.zeros_like(equilibrium.contact)
+    pressed[nearest] = True
+    assert not sensitivity(equilibrium).forces[CABLE].any()
+    assert sensitivity(equilibrium, pressed).multipliers[CABLE][nearest] > 0
+
+
+def test_slack_cable_and_foreign_contacts_are_refused():
+    solver = Solver(ROBOT, Scene(PUSHED[:1]))
+    with pytest.raises(ValueError, match=r"cable_mm is 0.0; it must be positive"):
+        sensitivity(solver.rest())
+    with pytest.raises(ValueError, match="active has shape"):
+        sensitivity(solver.step(solver.rest(), 1.0), np.ones((1, 2, 19), bool))
