@@ -11,11 +11,13 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from timeit import timeit
 
 import numpy as np
 
 from solver import Circle, Equilibrium, Robot, Scene, Solver, Status
 from solver.forces import clearance
+from solver.memo import TransitionMemo
 from solver.reference import ReferenceSolver
 
 STEPS_PER_SCENE = 100
@@ -88,20 +90,54 @@ def reference_times(steps: list[Timed]) -> tuple[np.ndarray, np.ndarray]:
     return np.array(kernel), np.array(reference)
 
 
+PUSHED = Circle(center=(44, 104), radius=15)  # of the paper's Fig. 4a
+PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25)])
+
+
 def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
-    """Mean over the steps of a path of each step's median time, by number of segments [µs].
+    """Mean over the steps of a path of each step's median time, by number of segments [µs]."""
+    solvers = {n: Solver(Robot.prototype(segments=n), Scene([PUSHED])) for n in counts}
+    return {
+        n: float(np.median([path_times(solver) for _ in range(repeats)], axis=0).mean())
+        for n, solver in solvers.items()
+    }
 
-    The path is the paper's Fig. 4a circle, pulled to 8 mm and back.
-    """
-    commands = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25)])
-    return {n: float(np.median([path_times(n, commands) for _ in range(repeats)], axis=0).mean()) for n in counts}
+
+def far_ratio(repeats: int = 40) -> float:
+    """Time of a path with ten far obstacles over that without them, each the median of runs side by side."""
+    far = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(10)]
+    alone, crowded = (Solver(Robot.prototype(), Scene([PUSHED, *others])) for others in ([], far))
+    times = np.array([(path_times(alone), path_times(crowded)) for _ in range(repeats)])
+    mean_alone, mean_crowded = np.median(times, axis=0).mean(axis=1)
+    return float(mean_crowded / mean_alone)
 
 
-def path_times(segments: int, commands: np.ndarray) -> list[float]:
-    """Times of the steps of one path [µs]."""
-    solver = Solver(Robot.prototype(segments=segments), Scene([Circle(center=(44, 104), radius=15)]))
+def cold_ratio(repeats: int = 40) -> float:
+    """Time from rest to 8 mm by continuation in steps of 0.25 mm over that of the last step alone."""
+    solver = Solver(Robot.prototype(), Scene([PUSHED]))
+    upwards = len(PATH) // 2
+    times = np.median([path_times(solver)[:upwards] for _ in range(repeats)], axis=0)
+    return float(times.sum() / times[-1])
+
+
+def memo_ratio(repeats: int = 21) -> float:
+    """Time of a warm step over that of its replay from the memo, called from Python; medians of runs side by side."""
+    solver = Solver(Robot.prototype(), Scene([PUSHED]))
+    memo, now = TransitionMemo(solver), solver.rest()
+    for command in PATH[:30]:
+        now = solver.step(now, float(command))
+    memo.step(now, 7.75)
+    both = [
+        [timeit(lambda who=who: who.step(now, 7.75), number=1000) for who in (solver, memo)] for _ in range(repeats)
+    ]
+    warm, replay = np.median(both, axis=0)
+    return float(warm / replay)
+
+
+def path_times(solver: Solver) -> list[float]:
+    """Times of the steps of the path to 8 mm and back [µs]."""
     now, times = solver.rest(), []
-    for command in commands:
+    for command in PATH:
         step = timed_step(solver, now, float(command))
         now = step.end
         times.append(step.microseconds)
@@ -139,6 +175,10 @@ def main() -> None:
     exponent = float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0])
     print("segments: " + ", ".join(f"{n}: {mean:.1f} µs" for n, mean in means.items()) + f"; growth n^{exponent:.2f}")
 
+    far, cold, memo = far_ratio(), cold_ratio(), memo_ratio()
+    print(f"ten far obstacles cost {far:.2f} times the step; a cold solve of the end of the path {cold:.0f} warm steps")
+    print(f"a warm step takes {memo:.1f} times as long as its replay from the memo")
+
     if arguments.json:
         report = {
             "steps": len(times),
@@ -152,6 +192,9 @@ def main() -> None:
             "ipopt_ratio": ratio,
             "segments_mean_us": means,
             "growth_exponent": exponent,
+            "far_ratio": far,
+            "cold_ratio": cold,
+            "memo_ratio": memo,
         }
         arguments.json.write_text(json.dumps(report, indent=2) + "\n")
 

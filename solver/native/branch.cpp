@@ -30,6 +30,7 @@ void Branch::load(const double* block) {
   for (std::size_t i = 0; i <= n; ++i) nodes_[i] = {{block[3 * i], block[3 * i + 1]}};
   block += 3 * (n + 1);
   for (std::size_t i = 0; i <= n; ++i, block += 2) levers_[i] = {{block[0] - nodes_[i][0], block[1] - nodes_[i][1]}};
+  newton_.chain.look_around(nodes_);
   place_points(newton_.chain.robot(), nodes_, levers_, points_);
   present_.active.count = 0;
   for (int c = 0; c < newton_.chain.contacts(); ++c)
@@ -90,8 +91,9 @@ bool Branch::passable(double allowed) const {
   }
   if (farthest > allowed * allowed) return false;
   farthest = std::sqrt(farthest);
-  for (const Obstacle& obstacle : chain.obstacles()) {
-    if (farthest <= kSweepStride * obstacle.fineness) continue;
+  for (std::size_t j = 0; j < chain.obstacles().size(); ++j) {
+    const Obstacle& obstacle = chain.obstacles()[j];
+    if (farthest <= kSweepStride * obstacle.fineness || chain.far(static_cast<int>(j), farthest)) continue;
     for (int k = 0; k < points; ++k)
       if (obstacle.touchable[k] && !passes(obstacle, points_[k], chain.points()[k])) return false;
   }

@@ -36,6 +36,8 @@ Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
     : robot_(robot),
       obstacles_(obstacles),
       bends_(robot.segments),
+      origin_(robot.segments + 1),
+      clear_(obstacles.size()),
       states_(robot.segments + 1),
       nodes_(robot.segments + 1),
       levers_(robot.segments + 1),
@@ -51,6 +53,11 @@ Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line / robot.offset});
   for (const double line : robot.lines) reach_ = std::max(reach_, std::abs(line));
   reach_ += limits::kReach + (robot.between > 0 ? robot.length : 0);
+}
+
+void Chain::look_around(std::span<const Position> nodes) {
+  std::copy(nodes.begin(), nodes.end(), origin_.begin());
+  for (std::size_t j = 0; j < obstacles_.size(); ++j) clear_[j] = clearance(obstacles_[j], nodes) - reach_;
 }
 
 bool Chain::evaluate(const std::vector<Control>& shear, double cable) {
@@ -83,8 +90,16 @@ void Chain::measure_gaps() {
   const int n = robot_.segments, stride = robot_.between + 1;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
-  int first = 0;  // contact of the obstacle
-  for (const Obstacle& obstacle : obstacles_) {
+  double drift = 0;
+  for (int i = 0; i <= n; ++i) {
+    const double dx = nodes_[i][0] - origin_[i][0], dy = nodes_[i][1] - origin_[i][1];
+    drift = std::max(drift, dx * dx + dy * dy);
+  }
+  drift_ = std::sqrt(drift);
+  for (int j = 0; j < static_cast<int>(obstacles_.size()); ++j) {
+    if (far(j, 0)) continue;
+    const Obstacle& obstacle = obstacles_[j];
+    const int first = j * robot_.points();
     for (int i = 0; i <= n; ++i) {
       const double distance = clearance(obstacle, nodes_[i]) - reach_;
       if (distance > 0) {
@@ -98,7 +113,6 @@ void Chain::measure_gaps() {
           near_.push_back(first + k);
         }
     }
-    first += robot_.points();
   }
 }
 

@@ -77,6 +77,9 @@ class Chain {
  public:
   Chain(const Robot& robot, const std::vector<Obstacle>& obstacles);
 
+  // Measures how far each obstacle is from a shape, so that it can be passed over while the robot stays close to it.
+  void look_around(std::span<const Position> nodes);
+
   // Shape at a cable displacement; false when a shear leaves the range of the segment law.
   bool evaluate(const std::vector<Control>& shear, double cable);
 
@@ -100,6 +103,7 @@ class Chain {
   // Contacts within reach, and the gap of every contact, infinite for those that are not.
   const std::vector<int>& near() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
+  bool far(int obstacle, double motion) const { return clear_[obstacle] > drift_ + motion; }  // even after this motion
   void survey(double* gaps) const;  // of every contact, whether within reach or not
   System::Force slope(int contact) const;  // of a gap with respect to the states of the nodes beside it
   const std::vector<Control>& gradient() const { return gradient_; }
@@ -121,6 +125,9 @@ class Chain {
   double reach_ = 0;  // from a node, within which its points may be near an obstacle
   double pull_ = 0, objective_ = 0, steepest_ = 0;
   std::vector<Bend> bends_;
+  std::vector<Position> origin_;  // nodes of the shape looked around from
+  std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach
+  double drift_ = 0;              // how far they have
   std::vector<State> states_;
   std::vector<Position> nodes_;
   std::vector<Position> levers_;

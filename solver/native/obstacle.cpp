@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "limits.hpp"
 
@@ -52,6 +53,20 @@ double clearance(const Obstacle& obstacle, const Position& point) {
   if (obstacle.shape == Shape::kHalfPlane) return measure_gap(obstacle, point).value;
   const double dx = point[0] - obstacle.center[0], dy = point[1] - obstacle.center[1];
   return std::sqrt(dx * dx + dy * dy) - obstacle.radius;
+}
+
+double clearance(const Obstacle& obstacle, std::span<const Position> points) {
+  const Position normal = {{obstacle.parameters[0], obstacle.parameters[1]}};
+  double nearest = std::numeric_limits<double>::infinity();
+  if (obstacle.shape == Shape::kHalfPlane) {
+    for (const Position& point : points) nearest = std::min(nearest, dot(normal, point));
+    return nearest - obstacle.parameters[2];
+  }
+  for (const Position& point : points) {
+    const double dx = point[0] - obstacle.center[0], dy = point[1] - obstacle.center[1];
+    nearest = std::min(nearest, dx * dx + dy * dy);
+  }
+  return std::sqrt(nearest) - obstacle.radius;
 }
 
 bool passes(const Obstacle& obstacle, const Position& from, const Position& to) {

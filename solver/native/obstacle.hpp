@@ -33,8 +33,9 @@ Gap measure_gap(const Obstacle& obstacle, const Position& point);
 // Gaps of several points, without their derivatives.
 void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, double* gaps);
 
-// A lower bound of the distance between a point and the obstacle.
+// A lower bound of the distance between a point, or the nearest of several, and the obstacle.
 double clearance(const Obstacle& obstacle, const Position& point);
+double clearance(const Obstacle& obstacle, std::span<const Position> points);
 
 // Whether the straight path from one point outside to another stays out of the obstacle, but for its very rim.
 bool passes(const Obstacle& obstacle, const Position& from, const Position& to);
