@@ -15,7 +15,10 @@ class Status(IntEnum):
     SNAPPED = 1
     """The equilibrium turned unstable on the way; the robot moved to the one it reaches physically."""
     STALLED = 2
-    """The cable tension reached the robot's limit, or would exceed it in a snap; the cable moved as far as that."""
+    """The cable tension reached the robot's limit, or would exceed it in a snap; the cable moved as far as that.
+
+    Where a release ends in a snap to more tension than the motor holds, it yields: the cable goes farther than asked.
+    """
     JAMMED = 3
     """Geometry blocks the robot; the largest feasible part of the increment was applied."""
     FAILED = 4

@@ -211,7 +211,13 @@ Status Branch::follow(double target) {
     // A touching robot is not slackened below its pretension.
     const double goal = present_.active.count > 0 ? std::max(target, std::min(present_.cable, kPretension)) : target;
     const double remaining = goal - present_.cable;
-    if (remaining == 0) return reached;
+    if (remaining == 0) {
+      // A release may end in a snap to more tension than the motor holds: it yields until it holds again.
+      if (tension_ <= newton_.chain.robot().max_tension || present_.cable == 0) return reached;
+      target = std::max(present_.cable - kYield, 0.0);
+      reached = Status::kStalled;
+      continue;
+    }
     if (remaining > 0 && at_limit()) return Status::kStalled;
     const double size = std::min(step, std::abs(remaining));
     const double cable = size == std::abs(remaining) ? goal : present_.cable + std::copysign(size, remaining);

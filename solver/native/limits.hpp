@@ -48,6 +48,7 @@ inline constexpr int kBranchEnds = 24;         // ends met in one step before th
 
 // Stall: the cable stops where the tension is within this fraction below its limit.
 inline constexpr double kTensionBand = 1e-6;
+inline constexpr double kYield = 0.02;         // cable displacement a motor gives at a time when it cannot hold
 inline constexpr int kStallIterations = 40;
 inline constexpr double kCableResolution = 1e-12;  // relative; a narrower bracket is not searched
 
