@@ -120,10 +120,8 @@ class Equilibrium:
         The multipliers are those of the equalities, by least squares, and of the gaps.
         """
         unknowns, parameters = self._node_point()
-        slope, _, equality_slopes, _, gap_slopes = self._node_derivatives(unknowns, parameters)
-        forces = self.multipliers[:, :, 1:].ravel()
-        balance = slope.ravel() - (gap_slopes.T @ forces if forces.size else 0.0)
-        return unknowns, parameters, np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0], forces
+        balance, equality_slopes = self._balance(self._node_derivatives(unknowns, parameters))
+        return unknowns, parameters, _tensions(balance, equality_slopes), self.multipliers[:, :, 1:].ravel()
 
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
         shapes = [value for obstacle in self.scene for value in obstacle.parameters]
@@ -134,16 +132,23 @@ class Equilibrium:
         derivatives = node_derivatives(self.robot, self.scene.kinds)(unknowns, parameters)
         return [value.full() for value in derivatives]
 
+    def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Slope of the objective less the contact forces, and the slopes of the equalities that balance it."""
+        slope, _, equality_slopes, _, gap_slopes = derivatives
+        forces = self.multipliers[:, :, 1:].ravel()
+        return slope.ravel() - (gap_slopes.T @ forces if forces.size else 0.0), equality_slopes
+
     def residuals(self) -> Residuals:
         """Recompute the optimality conditions of eq. 5 from the nodes and multipliers alone.
 
         The derivatives are those of the node-coordinate problem in :mod:`solver.formulation`, which shares nothing
         with the reduced coordinates that the solver works in.
         """
-        unknowns, parameters, tensions, forces = self.node_solution()
-        slope, lengths, equality_slopes, gaps, gap_slopes = self._node_derivatives(unknowns, parameters)
+        derivatives = self._node_derivatives(*self._node_point())
+        _, lengths, _, gaps, _ = derivatives
+        balance, equality_slopes = self._balance(derivatives)
+        tensions, forces = _tensions(balance, equality_slopes), self.multipliers[:, :, 1:].ravel()
         touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
-        balance = slope.ravel() - (gap_slopes.T @ forces if forces.size else 0.0)
         clearance = gaps.ravel()[touchable]
         return Residuals(
             stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
@@ -152,3 +157,8 @@ class Equilibrium:
             complementarity=float(np.abs(forces[touchable] * clearance).max(initial=0.0)),
             sign=float(max(0.0, -forces.min(initial=0.0))),
         )
+
+
+def _tensions(balance: np.ndarray, equality_slopes: np.ndarray) -> np.ndarray:
+    """Multipliers of the equalities, by least squares."""
+    return np.asarray(np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0])

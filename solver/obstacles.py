@@ -10,6 +10,7 @@ import numpy as np
 
 from solver import _kernel
 from solver.formulation import GAP_LAWS, POLYGON_CORNERS
+from solver.robot import require_positive
 
 Pair = tuple[float, float]
 
@@ -117,7 +118,7 @@ class Circle(Obstacle):
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
         object.__setattr__(self, "center", _pair("center", self.center))
-        _require_positive("radius", self.radius)
+        require_positive("radius", self.radius)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -196,7 +197,7 @@ class Ellipse(Obstacle):
         object.__setattr__(self, "radii", _pair("radii", self.radii))
         object.__setattr__(self, "axis", _unit("axis", self.axis, "of the first half-axis"))
         for radius in self.radii:
-            _require_positive("a half-axis of radii", radius)
+            require_positive("a half-axis of radii", radius)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -238,7 +239,7 @@ class Capsule(Obstacle):
         Obstacle.__post_init__(self)
         object.__setattr__(self, "start", _pair("start", self.start))
         object.__setattr__(self, "end", _pair("end", self.end))
-        _require_positive("radius", self.radius)
+        require_positive("radius", self.radius)
         if self.start == self.end:
             raise ValueError(f"start and end are both {self.start}; they must differ (a Circle has one centre)")
 
@@ -287,7 +288,7 @@ class Polygon(Obstacle):
         if not (all(turn > 0 for turn in turns) and sum(turns) < 3 * math.pi):
             raise ValueError(f"corners is {self.corners}; they must go once round a convex polygon, none straight")
         object.__setattr__(self, "corners", corners)
-        _require_positive("radius", self.radius)
+        require_positive("radius", self.radius)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -323,11 +324,6 @@ def _unit(name: str, value: Iterable[float], meaning: str) -> Pair:
     if size == 0:
         raise ValueError(f"{name} is (0, 0); give the direction {meaning}")
     return x / size, y / size
-
-
-def _require_positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name} is {value}; it must be positive and finite")
 
 
 def _turns(corners: tuple[Pair, ...]) -> list[float]:

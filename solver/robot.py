@@ -36,7 +36,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         for name in ("length_mm", "offset_mm", "rigidity"):
-            _require_positive(name, getattr(self, name))
+            require_positive(name, getattr(self, name))
         object.__setattr__(self, "touch", tuple(self.touch))
         if not self.touch or len(set(self.touch)) != len(self.touch) or not set(self.touch) <= set(LINES):
             raise ValueError(f"touch is {self.touch}; it must name some of {LINES}, each once")
@@ -48,7 +48,7 @@ class Robot:
             raise ValueError(f"segments is {self.segments!r}; it must be a whole number from 2 to 4096")
         if self.max_cable_mm is None:
             object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, 0.5 * self.length_mm))
-        _require_positive("max_cable_mm", self.max_cable_mm)
+        require_positive("max_cable_mm", self.max_cable_mm)
         bound = min(self.length_mm, 2 * self.segments * self.offset_mm)
         if not self.cable_limit_mm < bound:
             raise ValueError(
@@ -98,6 +98,11 @@ class Robot:
         return self.max_cable_mm
 
 
-def _require_positive(name: str, value: float | None) -> None:
+def require_positive(name: str, value: float | None) -> None:
+    """Refuse what is not a positive, finite number.
+
+    Raises:
+        ValueError: Naming the value.
+    """
     if value is None or not (math.isfinite(value) and value > 0):
         raise ValueError(f"{name} is {value}; it must be positive and finite")

@@ -7,7 +7,7 @@ import numpy as np
 from solver._kernel import SHAPE_SIZE, Kernel
 from solver.equilibrium import Equilibrium
 from solver.geometry import touchable_points
-from solver.obstacles import SHAPES, Obstacle
+from solver.obstacles import SHAPES
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
@@ -114,7 +114,7 @@ def check_clear(rest: Equilibrium) -> None:
     for obstacle, gaps in zip(rest.scene, rest.gaps, strict=True):
         if gaps.min() < 0:
             node = int(np.unravel_index(gaps.argmin(), gaps.shape)[1]) // (rest.robot.between + 1)
-            raise ValueError(f"{_name(obstacle)} overlaps the straight robot by {-gaps.min():.3g} mm at node {node}")
+            raise ValueError(f"{obstacle!r} overlaps the straight robot by {-gaps.min():.3g} mm at node {node}")
 
 
 def check_command(robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float) -> None:
@@ -135,7 +135,3 @@ def check_command(robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm
 
 def _filled(values: tuple[float, ...], size: int) -> tuple[float, ...]:
     return values + (size - len(values)) * (0.0,)
-
-
-def _name(obstacle: Obstacle) -> str:
-    return repr(obstacle)

@@ -49,10 +49,11 @@ bool Newton::convexify(const ActiveSet& active) {
 void Newton::shape_system(const ActiveSet& active, double strength) {
   chain.curvature(active, system_);
   for (int j = 0; j < active.count; ++j) {
+    penalty_[j] = 0;
+    if (strength == 0) continue;
     const System::Force slope = chain.slope(active.contact[j]);
     const double reach = chain.robot().length * (slope.node + slope.split);
     penalty_[j] = strength / (reach * reach);
-    if (strength == 0) continue;
     const auto outer = [&](const State& a, const State& b) {
       Mat<3, 3> product;
       for (int r = 0; r < 3; ++r)

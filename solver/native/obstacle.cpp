@@ -50,9 +50,7 @@ void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, do
 }
 
 double clearance(const Obstacle& obstacle, const Position& point) {
-  if (obstacle.shape == Shape::kHalfPlane) return measure_gap(obstacle, point).value;
-  const double dx = point[0] - obstacle.center[0], dy = point[1] - obstacle.center[1];
-  return std::sqrt(dx * dx + dy * dy) - obstacle.radius;
+  return clearance(obstacle, std::span(&point, 1));
 }
 
 double clearance(const Obstacle& obstacle, std::span<const Position> points) {
