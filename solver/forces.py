@@ -144,7 +144,8 @@ def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
     """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact."""
     nodes = free_nodes(robot, cable_mm)
     points = touching_points(robot, nodes)
-    gaps = [obstacle.gap(points)[touchable_points(robot, obstacle)].min() for obstacle in scene]
+    touchable = touchable_points(robot, scene)
+    gaps = [obstacle.gap(points)[touched].min() for obstacle, touched in zip(scene, touchable, strict=True)]
     return float(min(gaps, default=np.inf))
 
 

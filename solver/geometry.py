@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from solver.obstacles import Obstacle
 from solver.robot import Robot
+from solver.scene import Scene
 
 
 def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:
@@ -19,12 +19,14 @@ def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:
     return np.asarray((1 - fraction) * lines[:, node] + fraction * lines[:, node + 1])
 
 
-def touchable_points(robot: Robot, obstacle: Obstacle) -> np.ndarray:
-    """Which of these points can touch an obstacle, ``(lines, positions)`` bool: all, or those of its nodes.
+def touchable_points(robot: Robot, scene: Scene) -> np.ndarray:
+    """Which of these points can touch each obstacle, ``(m, lines, positions)`` bool: all, or those of its nodes.
 
     Raises:
-        ValueError: If the obstacle names a node that the robot does not have.
+        ValueError: If an obstacle names a node that the robot does not have.
     """
-    touchable = np.full((len(robot.touch), robot.positions), obstacle.nodes is None)
-    touchable[:, :: robot.between + 1] = obstacle.touchable(robot.segments + 1)
+    touchable = np.empty((len(scene), len(robot.touch), robot.positions), bool)
+    for points, obstacle in zip(touchable, scene, strict=True):
+        points[:] = obstacle.nodes is None
+        points[:, :: robot.between + 1] = obstacle.touchable(robot.segments + 1)
     return touchable

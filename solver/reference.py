@@ -84,9 +84,7 @@ class ReferenceSolver:
         self.robot = robot
         self.scene = scene
         self._shapes = [value for obstacle in scene for value in obstacle.parameters]
-        self._contacts = (len(scene), len(robot.touch), robot.positions)
-        touchable = [touchable_points(robot, obstacle) for obstacle in scene]
-        self._touchable = np.array(touchable, dtype=bool).reshape(self._contacts)
+        self._touchable = touchable_points(robot, scene)
         check_width(robot, scene)
         self._build()
         self._rest = self._equilibrium(self._free(0.0), Status.CONVERGED, 0)
@@ -249,7 +247,7 @@ class ReferenceSolver:
     def _equilibrium(self, point: _Point, status: Status, iterations: int) -> Equilibrium:
         pose = self._pose(point.unknowns)
         nodes = np.column_stack([pose.backbone, pose.angles])
-        multipliers = np.zeros(self._contacts)
+        multipliers = np.zeros(self._touchable.shape)
         multipliers[:, :, 1:] = self._forces(point).reshape(multipliers[:, :, 1:].shape)
         parts: list[Any] = [
             [point.cable, self._tension(point), np.sum(pose.turns**2)],
@@ -264,5 +262,5 @@ class ReferenceSolver:
 
     def _gaps(self, nodes: np.ndarray) -> np.ndarray:
         points = touching_points(self.robot, nodes)
-        gaps = np.reshape([obstacle.gap(points) for obstacle in self.scene], self._contacts)
+        gaps = np.reshape([obstacle.gap(points) for obstacle in self.scene], self._touchable.shape)
         return np.where(self._touchable, gaps, np.inf)

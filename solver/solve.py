@@ -31,8 +31,7 @@ class Solver:
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self.robot = robot
         self.scene = scene
-        points = len(robot.touch) * robot.positions
-        touchable = np.array([touchable_points(robot, obstacle).ravel() for obstacle in scene], dtype=bool)
+        touchable = touchable_points(robot, scene)
         check_width(robot, scene)
         extents = [obstacle.extent for obstacle in scene]
         self._kernel = Kernel(
@@ -46,7 +45,7 @@ class Solver:
             [SHAPES[kind] for kind in scene.kinds],
             np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
             np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
-            touchable.reshape(len(scene), points),
+            touchable.reshape(len(scene), len(robot.touch) * robot.positions),
         )
         self._rest = self._follow(np.zeros(self._kernel.block_size), 0.0)
         check_clear(self._rest)
