@@ -13,7 +13,8 @@ from matplotlib.axes import Axes
 from agents import paper
 from agents.figures import draw_shape
 from solver import Equilibrium, Robot, Scene, Solver
-from solver.forces import VirtualWork, fitted_slopes, free_nodes, tip_slopes
+from solver.forces import VirtualWork
+from solver.free import fitted_slopes, free_nodes, tip_slopes
 
 ROBOT = Robot.prototype(max_tension=math.inf)
 FIT_RANGE = (0.0, 8.0)  # cable displacements the straight lines of Fig. 7 are fitted over [mm]

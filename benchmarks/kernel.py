@@ -16,7 +16,7 @@ from timeit import timeit
 import numpy as np
 
 from solver import Circle, Equilibrium, Robot, Scene, Solver, Status
-from solver.forces import clearance
+from solver.free import clearance
 from solver.memo import TransitionMemo
 from solver.reference import ReferenceSolver
 
@@ -51,7 +51,7 @@ def timed_step(solver: Solver, start: Equilibrium, command: float) -> Timed:
     """Step, with the time of the compiled call alone."""
     block = np.empty_like(start.block)
     begin = time.perf_counter_ns()
-    status, iterations = solver._kernel.step(start.block, command, block)
+    status, iterations = solver._kernel.step(start.block, command, start.length_mm, block)
     elapsed = (time.perf_counter_ns() - begin) / 1e3
     return Timed(
         solver, start, command, Equilibrium(solver.robot, solver.scene, block, Status(status), iterations), elapsed

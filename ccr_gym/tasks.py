@@ -6,7 +6,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
-from solver.forces import clearance, force_true
+from solver.forces import force_true
+from solver.free import clearance
 
 MAX_DRAWS = 1000
 PROBE_MM = 0.5  # cable displacement between the equilibria of a trial pull

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import casadi as ca
-from formulation import GAP_LAWS, gap_function, segment_function
+from formulation import GAP_LAWS, arc_function, gap_function, segment_function
 
 
 def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
@@ -16,5 +16,5 @@ def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    generate("segment_law", [segment_function()], Path(sys.argv[1]))
+    generate("segment_laws", [segment_function(), arc_function()], Path(sys.argv[1]))
     generate("gap_laws", [gap_function(kind) for kind in GAP_LAWS], Path(sys.argv[1]))

@@ -19,8 +19,8 @@ class Residuals(NamedTuple):
     Attributes:
         stationarity: Largest entry of the Lagrangian's gradient, equality multipliers by least squares [rad²/mm].
         lengths: Largest violation of a backbone, cable or disk length [mm].
-        gaps: Deepest penetration, at least 0 [mm].
-        complementarity: Largest product of a multiplier and its gap [rad²].
+        gaps: Deepest penetration, or what a sliding cable is too short, at least 0 [mm].
+        complementarity: Largest product of a multiplier and its gap, or of the tension and the slack [rad²].
         sign: Most negative multiplier's size, at least 0 [rad²/mm].
     """
 
@@ -63,31 +63,47 @@ class Equilibrium:
         return float(self.block[0])
 
     @property
+    def length_mm(self) -> float:
+        """Length of the backbone L0, which insertion changes [mm]."""
+        return float(self.block[1])
+
+    @property
     def tension(self) -> float:
         """Cable tension dE/dl along the branch [N]."""
-        return float(self.block[1])
+        return float(self.block[2])
 
     @property
     def objective(self) -> float:
         """Sum of squared disk angles J = Σθ² [rad²]."""
-        return float(self.block[2])
+        return float(self.block[3])
+
+    @property
+    def stiffness(self) -> float:
+        """B = EI / 2 l0 [N·mm], which turns the objective J into energy."""
+        return self.robot.rigidity * self.robot.segments / (2 * self.length_mm)
 
     @property
     def shear(self) -> np.ndarray:
-        """Shear angle ψ of each segment, ``(n,)`` [rad]."""
-        return np.asarray(np.arcsin(self.block[3 : 3 + self.robot.segments]))
+        """Shear angle ψ of each segment, ``(n,)`` [rad]; zero with a sliding cable."""
+        sines = self.block[4 : 4 + self.robot.segments]
+        return np.zeros_like(sines) if self.robot.cable == "sliding" else np.asarray(np.arcsin(sines))
 
     @property
     def nodes(self) -> np.ndarray:
         """Backbone point and disk angle of each node, ``(n+1, 3)`` [mm, mm, rad]."""
         n = self.robot.segments
-        return self.block[3 + n : 6 + 4 * n].reshape(n + 1, 3)
+        return self.block[4 + n : 7 + 4 * n].reshape(n + 1, 3)
 
     @property
     def cable_nodes(self) -> np.ndarray:
         """Cable point on each disk, ``(n+1, 2)`` [mm]."""
         n = self.robot.segments
-        return self.block[6 + 4 * n : 8 + 6 * n].reshape(n + 1, 2)
+        return self.block[7 + 4 * n : 9 + 6 * n].reshape(n + 1, 2)
+
+    @property
+    def slack_mm(self) -> float:
+        """How much longer the cable is than its way through the disks [mm]; zero but for a slack, sliding cable."""
+        return self.length_mm - self.cable_mm - float(np.hypot(*np.diff(self.cable_nodes, axis=0).T).sum())
 
     @property
     def points(self) -> np.ndarray:
@@ -106,7 +122,7 @@ class Equilibrium:
 
     def _contacts(self, which: int) -> np.ndarray:
         shape = (len(self.scene), len(self.robot.touch), self.robot.positions)
-        start, size = 8 + 6 * self.robot.segments, math.prod(shape)
+        start, size = 9 + 6 * self.robot.segments, math.prod(shape)
         return self.block[start + which * size : start + (which + 1) * size].reshape(shape)
 
     @property
@@ -117,15 +133,21 @@ class Equilibrium:
     def node_solution(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Unknowns, parameters and multipliers of :func:`solver.formulation.node_problem` at this equilibrium.
 
-        The multipliers are those of the equalities, by least squares, and of the gaps.
+        The multipliers are those of the equalities, by least squares, and of the inequalities.
         """
         unknowns, parameters = self._node_point()
         balance, equality_slopes = self._balance(self._node_derivatives(unknowns, parameters))
-        return unknowns, parameters, _tensions(balance, equality_slopes), self.multipliers[:, :, 1:].ravel()
+        return unknowns, parameters, _tensions(balance, equality_slopes), self.pushes
+
+    @property
+    def pushes(self) -> np.ndarray:
+        """Multipliers of the inequalities of :func:`solver.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
+        multipliers = self.multipliers[:, :, 1:].ravel()
+        return np.r_[self.tension / self.stiffness, multipliers] if self.robot.cable == "sliding" else multipliers
 
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
         shapes = [value for obstacle in self.scene for value in obstacle.parameters]
-        parameters = np.array([self.cable_mm, self.robot.length_mm, self.robot.offset_mm, *shapes])
+        parameters = np.array([self.cable_mm, self.length_mm, self.robot.offset_mm, *shapes])
         return np.concatenate([self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel()]), parameters
 
     def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
@@ -135,8 +157,8 @@ class Equilibrium:
     def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Slope of the objective less the contact forces, and the slopes of the equalities that balance it."""
         slope, _, equality_slopes, _, gap_slopes = derivatives
-        forces = self.multipliers[:, :, 1:].ravel()
-        return slope.ravel() - (gap_slopes.T @ forces if forces.size else 0.0), equality_slopes
+        pushes = self.pushes
+        return slope.ravel() - (gap_slopes.T @ pushes if pushes.size else 0.0), equality_slopes
 
     def residuals(self) -> Residuals:
         """Recompute the optimality conditions of eq. 5 from the nodes and multipliers alone.
@@ -147,15 +169,16 @@ class Equilibrium:
         derivatives = self._node_derivatives(*self._node_point())
         _, lengths, _, gaps, _ = derivatives
         balance, equality_slopes = self._balance(derivatives)
-        tensions, forces = _tensions(balance, equality_slopes), self.multipliers[:, :, 1:].ravel()
+        tensions, pushes = _tensions(balance, equality_slopes), self.pushes
         touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
+        touchable = np.concatenate([np.ones(pushes.size - touchable.size, bool), touchable])
         clearance = gaps.ravel()[touchable]
         return Residuals(
             stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
             lengths=float(np.abs(lengths).max()),
             gaps=float(max(0.0, -clearance.min(initial=0.0))),
-            complementarity=float(np.abs(forces[touchable] * clearance).max(initial=0.0)),
-            sign=float(max(0.0, -forces.min(initial=0.0))),
+            complementarity=float(np.abs(pushes[touchable] * clearance).max(initial=0.0)),
+            sign=float(max(0.0, -pushes.min(initial=0.0))),
         )
 
 

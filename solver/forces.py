@@ -10,16 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.equilibrium import Equilibrium
-from solver.geometry import touchable_points, touching_points
+from solver.free import clearance, free_tension, tip_slopes
 from solver.robot import Robot
-from solver.scene import Scene
 
 
 def force_true(equilibrium: Equilibrium) -> np.ndarray:
     """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 2)`` [N]."""
     forces = np.zeros((len(equilibrium.scene), 2))
     for obstacle, multiplier, normal in _contacts(equilibrium):
-        forces[obstacle] += equilibrium.robot.stiffness * multiplier * normal
+        forces[obstacle] += equilibrium.stiffness * multiplier * normal
     return forces
 
 
@@ -36,8 +35,8 @@ class Onset:
     def after(self, before: Equilibrium, now: Equilibrium) -> "Onset":
         """The onset after a step: kept during a contact, forgotten when it ends, found when one begins.
 
-        A contact that begins inside a step does so on the free robot; the tension there is that of the free robot at
-        the cable displacement where it first touches.
+        A contact that begins inside a step does so on the free robot; the tension there is that of the free robot
+        where it first touches.
         """
         if not now.multipliers.any():
             return Onset()
@@ -45,7 +44,7 @@ class Onset:
             return self
         if before.multipliers.any():
             return Onset(before.tension)
-        return Onset(free_tension(now.robot, _first_touch(now.robot, now.scene, before.cable_mm, now.cable_mm)))
+        return Onset(_first_tension(before, now))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +67,7 @@ class VirtualWork:
             return directions
         for obstacle, multiplier, normal in _contacts(equilibrium):
             directions[obstacle] += multiplier * (normal + self.friction * np.array([-normal[1], normal[0]]))
-        slopes = tip_slopes(equilibrium.robot, equilibrium.cable_mm)
+        slopes = tip_slopes(equilibrium.robot.at(equilibrium.length_mm), equilibrium.cable_mm)
         work = float((directions @ slopes[:2]).sum())
         load = equilibrium.robot.offset_mm * (equilibrium.tension - onset.tension) * slopes[2]
         return directions * (load / work) if work < 0 else np.zeros_like(directions)
@@ -91,77 +90,23 @@ class VirtualWork:
         return cls(friction=float((-offset_mm * load * slopes[2] / force - slopes[0]) / slopes[1]))
 
 
-def tip_slopes(robot: Robot, cable_mm: float) -> np.ndarray:
-    """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
-    angle = free_angle(robot, cable_mm)
-    turn = _turn(robot, cable_mm)
-    middles = np.arange(robot.segments) + 0.5
-    along = robot.segment_mm * middles * turn
-    return np.array(
-        [
-            (along * np.cos(middles * angle)).sum(),
-            -(along * np.sin(middles * angle)).sum(),
-            -robot.segments * turn,
-        ]
-    )
+def _first_tension(before: Equilibrium, now: Equilibrium) -> float:
+    """Tension of the free robot where it first touches, between one that is clear and one in contact [N]."""
 
+    def on_the_way(part: float) -> tuple[Robot, float]:
+        length = before.length_mm + part * (now.length_mm - before.length_mm)
+        return now.robot.at(length), before.cable_mm + part * (now.cable_mm - before.cable_mm)
 
-def fitted_slopes(robot: Robot, low_mm: float, high_mm: float) -> np.ndarray:
-    """Slopes of straight lines fitted to the free tip pose over a range of cable displacement (Fig. 7), as above.
+    def clear_of_all(part: float) -> bool:
+        robot, cable = on_the_way(part)
+        return clearance(robot, now.scene, cable) > 0
 
-    Raises:
-        ValueError: If the range is empty or outside the robot's.
-    """
-    if not 0 <= low_mm < high_mm <= robot.cable_limit_mm:
-        raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within 0 to {robot.cable_limit_mm:.6g} mm")
-    cables = np.linspace(low_mm, high_mm, 101)
-    tips = np.array([free_nodes(robot, cable)[-1] for cable in cables])
-    return np.asarray(np.polyfit(cables, tips, 1)[0])
-
-
-def free_angle(robot: Robot, cable_mm: float) -> float:
-    """Angle between consecutive disks of the free robot, whose shear vanishes [rad]."""
-    return float(2 * np.arcsin(cable_mm / (2 * robot.segments * robot.offset_mm)))
-
-
-def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
-    """Node poses of the free robot, ``(n+1, 3)`` [mm, mm, rad]."""
-    angle = free_angle(robot, cable_mm)
-    nodes = np.zeros((robot.segments + 1, 3))
-    middles = (np.arange(robot.segments) + 0.5) * angle
-    nodes[1:, 0] = robot.segment_mm * np.cumsum(np.sin(middles))
-    nodes[1:, 1] = robot.segment_mm * np.cumsum(np.cos(middles))
-    nodes[:, 2] = -angle * np.arange(robot.segments + 1)
-    return nodes
-
-
-def free_tension(robot: Robot, cable_mm: float) -> float:
-    """Cable tension of the free robot, ``B dJ/dl`` [N]."""
-    return 2 * robot.stiffness * robot.segments * free_angle(robot, cable_mm) * _turn(robot, cable_mm)
-
-
-def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
-    """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact."""
-    nodes = free_nodes(robot, cable_mm)
-    points = touching_points(robot, nodes)
-    touchable = touchable_points(robot, scene)
-    gaps = [obstacle.gap(points)[touched].min() for obstacle, touched in zip(scene, touchable, strict=True)]
-    return float(min(gaps, default=np.inf))
-
-
-def _turn(robot: Robot, cable_mm: float) -> float:
-    """Slope of :func:`free_angle` in the cable displacement [rad/mm]."""
-    return float(1 / np.sqrt((robot.segments * robot.offset_mm) ** 2 - cable_mm**2 / 4))
-
-
-def _first_touch(robot: Robot, scene: Scene, clear: float, touching: float) -> float:
-    """Cable displacement where the free robot first touches, between a clear one and one in contact [mm]."""
-    if clearance(robot, scene, touching) >= 0:
-        return touching
-    for _ in range(20):
-        middle = (clear + touching) / 2
-        clear, touching = (middle, touching) if clearance(robot, scene, middle) > 0 else (clear, middle)
-    return touching
+    clear, touching = 0.0, 1.0
+    if not clear_of_all(touching):
+        for _ in range(20):
+            middle = (clear + touching) / 2
+            clear, touching = (middle, touching) if clear_of_all(middle) else (clear, middle)
+    return free_tension(*on_the_way(touching))
 
 
 def _contacts(equilibrium: Equilibrium) -> list[tuple[int, float, np.ndarray]]:

@@ -2,8 +2,8 @@
 
 Three layers, all in millimetre and radian:
 
-- *segment law*: the angle between consecutive disks as a function of σ = sin ψ, the sine of the shear angle, which
-  is the reduced coordinate that eliminates the length equalities of eq. 4;
+- *segment laws*: the shape of a segment in one reduced coordinate, which eliminates the length equalities of eq. 4:
+  for the uniform cable σ = sin ψ, the sine of the shear angle, for the sliding cable the angle θ between its disks;
 - *gap laws*: signed clearance of a point from an obstacle, scaled so that its gradient has unit length on the
   surface and a multiplier has units rad²/mm;
 - *node-coordinate problem*: eq. 4/5 of the paper as they stand, for the reference solver and for the certificate.
@@ -13,7 +13,7 @@ The first two are turned into C when the package is built (:mod:`solver.codegen`
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -149,6 +149,45 @@ def segment_function() -> ca.Function:
     return ca.Function("ccr_segment", [sine, pull, length, offset], [law])
 
 
+Symbol = TypeVar("Symbol", ca.SX, ca.MX)
+SERIES_TERMS = 12  # of the series below: to the last digit for a quarter turn
+
+
+def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
+    """``sin h / h`` and ``cos h`` in ``square = h²``, smooth at zero, by their power series for |h| ≤ π/2."""
+    sinc = cosine = 1 + 0 * square
+    for k in reversed(range(1, SERIES_TERMS)):
+        sinc = 1 - square / (2 * k * (2 * k + 1)) * sinc
+        cosine = 1 - square / (2 * k * (2 * k - 1)) * cosine
+    return sinc, cosine
+
+
+def arc_function() -> ca.Function:
+    """``(θ, l0, a) → f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''`` of a segment that is an arc, for a sliding cable.
+
+    The chord ``c = l0 sinc θ/2`` along the bisector has the components ``l0·(f, g)`` in the frame of the lower disk,
+    ahead and to its left; ``s = l0 − c + 2a sin θ/2`` is what the segment takes from the cable (Rao 2024).
+    """
+    angle, length, offset = (ca.SX.sym(name) for name in ("angle", "length", "offset"))
+    sinc, cosine = sinc_and_cosine(angle**2 / 4)
+    sine = angle / 2 * sinc
+    bent = ca.gradient(sinc, angle)
+    shortening = length * (1 - sinc) + 2 * offset * sine
+    taken = ca.gradient(shortening, angle)
+    law = ca.vertcat(
+        sinc * cosine,
+        -sinc * sine,
+        bent / sinc,
+        ca.gradient(bent, angle) / sinc,
+        1 - 2 * sine**2,
+        2 * sine * cosine,
+        shortening,
+        taken,
+        ca.gradient(taken, angle),
+    )
+    return ca.Function("ccr_arc", [angle, length, offset], [ca.cse(law)])
+
+
 def gap_function(kind: str) -> ca.Function:
     """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle."""
     law = GAP_LAWS[kind]
@@ -166,16 +205,18 @@ class NodeProblem(NamedTuple):
         unknowns: Backbone then cable points of nodes 1…n, each as x, y pairs, ``(4n,)`` [mm].
         parameters: ``(l, L0, a)`` then the shapes of the obstacles, one after the other.
         objective: Sum of squared disk angles [rad²].
-        equalities: Backbone, cable and disk lengths of the segments minus their values, ``(3n,)`` [mm].
-        gaps: Gap of every point that can touch, but for node 0, to every obstacle, ordered (obstacle, line, position),
-            ``(m·p·(k-1),)`` [mm].
+        equalities: Zero when every segment has its shape, ``(3n,)`` [mm]. With a uniform cable: lengths of backbone,
+            cable and disk minus their values. With a sliding one, whose segments are arcs: length of the chord minus
+            its value, component of the chord along the bisector of the disks, length of the disk minus its value.
+        inequalities: Not negative, ``(k,)`` [mm]: slack of a sliding cable, then the gap of every point that can touch,
+            but for node 0, to every obstacle, ordered (obstacle, line, position).
     """
 
     unknowns: ca.MX
     parameters: ca.MX
     objective: ca.MX
     equalities: ca.MX
-    gaps: ca.MX
+    inequalities: ca.MX
 
 
 def node_problem(robot: "Robot", kinds: tuple[str, ...]) -> NodeProblem:
@@ -195,18 +236,23 @@ def node_problem(robot: "Robot", kinds: tuple[str, ...]) -> NodeProblem:
     before, after = disk[:, :-1], disk[:, 1:]
     turned = before[0, :] * after[1, :] - before[1, :] * after[0, :]
     angle = ca.atan2(turned, ca.sum1(before * after))
-    equalities = ca.horzcat(
-        _norms(backbone[:, 1:] - backbone[:, :-1]) - total / segments,
-        _norms(cable[:, 1:] - cable[:, :-1]) - (total - pull) / segments,
-        _norms(after) - offset,
-    )
+    chords, cables = _norms(backbone[:, 1:] - backbone[:, :-1]), _norms(cable[:, 1:] - cable[:, :-1])
+    if robot.cable == "sliding":
+        sinc, _ = sinc_and_cosine(angle**2 / 4)
+        astride = ca.sum1((backbone[:, 1:] - backbone[:, :-1]) * (before + after)) / (2 * offset)
+        equalities = ca.horzcat(chords - total / segments * sinc, astride, _norms(after) - offset)
+        slack = total - pull - ca.sum2(cables)
+    else:
+        share = (total - pull) / segments
+        equalities = ca.horzcat(chords - total / segments, cables - share, _norms(after) - offset)
+        slack = ca.MX(0, 1)
     lines = {"backbone": backbone, "cable": cable, "rim": 2 * backbone - cable}
     gaps = [
         _gaps(kind, _divided(lines[line], robot.between)[:, 1:], shape)
         for kind, shape in zip(kinds, shapes, strict=True)
         for line in robot.touch
     ]
-    return NodeProblem(unknowns, parameters, ca.sumsqr(angle), equalities.T, ca.vertcat(*gaps) if gaps else ca.MX(0, 1))
+    return NodeProblem(unknowns, parameters, ca.sumsqr(angle), equalities.T, ca.vertcat(slack, *gaps))
 
 
 def _norms(columns: ca.MX) -> ca.MX:
@@ -226,14 +272,14 @@ def _gaps(kind: str, points: ca.MX, shape: ca.MX) -> ca.MX:
 
 @lru_cache(maxsize=32)
 def node_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
-    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, gaps, their Jacobian`` of :func:`node_problem`."""
+    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of :func:`node_problem`."""
     problem = node_problem(robot, kinds)
     outputs = [
         ca.gradient(problem.objective, problem.unknowns),
         problem.equalities,
         ca.jacobian(problem.equalities, problem.unknowns),
-        problem.gaps,
-        ca.jacobian(problem.gaps, problem.unknowns),
+        problem.inequalities,
+        ca.jacobian(problem.inequalities, problem.unknowns),
     ]
     return ca.Function("node_derivatives", [problem.unknowns, problem.parameters], outputs)
 
@@ -266,8 +312,8 @@ def moved_shape(kind: str, shape: ca.MX, motion: ca.MX) -> ca.MX:
 def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
     """Derivatives of the optimality conditions of :func:`node_problem`.
 
-    With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian ``L = J − ν·equalities − λ·gaps``,
-    its conditions ``F = (L_z, equalities, gaps)`` and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``.
+    With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian ``L = J − ν·equalities − λ·inequalities``,
+    its conditions ``F = (L_z, equalities, inequalities)`` and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``.
     The slope of the loads in the multipliers stands in ``F_v`` already.
     """
     problem = node_problem(robot, kinds)
@@ -279,11 +325,11 @@ def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
     ]
     changed = ca.vertcat(problem.parameters[:2] + change[:2], problem.parameters[2], *shapes)
     terms = ca.Function("terms", [problem.unknowns, problem.parameters], problem[2:])
-    objective, equalities, gaps = terms(problem.unknowns, changed)
-    tensions, forces = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("forces", gaps.shape[0])
-    lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(forces, gaps)
+    objective, equalities, inequalities = terms(problem.unknowns, changed)
+    tensions, pushes = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("pushes", inequalities.shape[0])
+    lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(pushes, inequalities)
     loads = ca.gradient(lagrangian, change)
-    conditions = ca.vertcat(ca.gradient(lagrangian, problem.unknowns), equalities, gaps)
+    conditions = ca.vertcat(ca.gradient(lagrangian, problem.unknowns), equalities, inequalities)
     outputs = [
         ca.jacobian(conditions, problem.unknowns),
         ca.jacobian(conditions, change),
@@ -291,4 +337,4 @@ def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
         ca.jacobian(loads, change),
     ]
     outputs = [ca.substitute(output, change, ca.MX.zeros(change.shape)) for output in outputs]
-    return ca.Function("kkt_derivatives", [problem.unknowns, problem.parameters, tensions, forces], outputs)
+    return ca.Function("kkt_derivatives", [problem.unknowns, problem.parameters, tensions, pushes], outputs)

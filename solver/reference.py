@@ -11,16 +11,17 @@ import numpy as np
 
 from solver.equilibrium import Equilibrium
 from solver.formulation import node_derivatives, node_problem
+from solver.free import free_angle, free_tension
 from solver.geometry import touchable_points, touching_points
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.solve import check_clear, check_command, check_width
 from solver.status import Status
 
-LARGEST_STEP, SMALLEST_STEP = 0.25, 0.03  # cable displacement of one solve, and of the last try of one [mm]
+LARGEST_STEP, SMALLEST_STEP = 0.25, 0.03  # cable, or half the insertion, of one solve, and of its last try [mm]
 PRETENSION = 0.05  # a touching robot is not slackened below it [mm]
 SLACK = 1e-3  # below it a shear costs too little for IPOPT, and the robot is taken as free [mm]
-CABLE_RESOLUTION = 1e-6  # to which the cable at the tension limit is found [mm]
+RESOLUTION = 1e-6  # to which the command at the tension limit is found [mm]
 MOVE_OFFSET, MOVE_SLOPE = 0.5, 16.0  # a node that moves farther than offset + slope·|step| has left the branch [mm]
 
 OPTIONS: dict[str, Any] = {
@@ -48,22 +49,23 @@ OPTIONS: dict[str, Any] = {
 
 
 class _Point(NamedTuple):
-    """A solution of the node problem: unknowns, and multipliers of (equalities, gaps) in CasADi's sign."""
+    """A solution of the node problem: unknowns, and multipliers of (equalities, inequalities) in CasADi's sign."""
 
     cable: float
+    length: float
     unknowns: np.ndarray
     multipliers: np.ndarray
     iterations: int = 0
 
 
 class _Pose(NamedTuple):
-    """A shape: points of nodes 0…n, angles of their disks, turns and sines of the shear angles of the segments."""
+    """A shape: points of nodes 0…n, angles of their disks, turns of the segments, and their reduced coordinates."""
 
     backbone: np.ndarray
     cable: np.ndarray
     angles: np.ndarray
     turns: np.ndarray
-    sines: np.ndarray
+    coordinates: np.ndarray
 
 
 class ReferenceSolver:
@@ -86,50 +88,59 @@ class ReferenceSolver:
         self._shapes = [value for obstacle in scene for value in obstacle.parameters]
         self._touchable = touchable_points(robot, scene)
         check_width(robot, scene)
+        self._sliding = robot.cable == "sliding"
         self._build()
-        self._rest = self._equilibrium(self._free(0.0), Status.CONVERGED, 0)
+        self._rest = self._equilibrium(self._free(0.0, robot.length_mm), Status.CONVERGED, 0)
         check_clear(self._rest)
 
     def rest(self) -> Equilibrium:
         """The straight, unactuated robot."""
         return self._rest
 
-    def step(self, equilibrium: Equilibrium, cable_mm: float) -> Equilibrium:
-        """Move the cable to a displacement along the branch, as far as the tension allows.
+    def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
+        """Move cable and base along the branch, as far as the tension allows.
 
         Args:
             equilibrium: Where the robot is, from this solver or a :class:`solver.Solver` of an equal robot and scene.
             cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
+            length_mm: Commanded length of the backbone [mm]; ``None`` keeps it.
 
         Returns:
             The equilibrium reached: ``CONVERGED``, ``STALLED`` at the tension limit, or
             ``FAILED`` with the present one.
 
         Raises:
-            ValueError: If the command is out of range or the equilibrium is another robot's or scene's.
+            ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
-        check_command(self.robot, self.scene, equilibrium, cable_mm)
+        length = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         present, iterations, largest = self._start(equilibrium), 0, LARGEST_STEP
-        while present.cable != (goal := self._goal(present, cable_mm)):
-            step = float(np.clip(goal - present.cable, -largest, largest))
-            following = self._solve(present, goal if abs(step) < largest else present.cable + step)
+        while (distance := _apart(present, cable := self._goal(present, cable_mm), length)) > 0:
+            part = min(1.0, largest / distance)
+            following = self._between(present, cable, length, part)
             if following is None:
                 if largest > SMALLEST_STEP:
                     largest /= 2
                     continue
                 return Equilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.FAILED, iterations)
             iterations += following.iterations
-            if step > 0 and self._tension(following) > self.robot.max_tension:
+            if self._tension(following) > max(self.robot.max_tension, self._tension(present)):
                 return self._equilibrium(self._limit(present, following), Status.STALLED, iterations)
             present = following
         return self._equilibrium(present, Status.CONVERGED, iterations)
 
+    def _between(self, present: _Point, cable: float, length: float, part: float) -> _Point | None:
+        """The solution a part of the way to a command."""
+        if part == 1:
+            return self._solve(present, cable, length)
+        towards = (present.cable + part * (cable - present.cable), present.length + part * (length - present.length))
+        return self._solve(present, *towards)
+
     def _build(self) -> None:
         n = self.robot.segments
         problem = node_problem(self.robot, self.scene.kinds)
-        constraints = ca.vertcat(problem.equalities, problem.gaps)
+        constraints = ca.vertcat(problem.equalities, problem.inequalities)
         # In units of the free robot's segment angle, so that the tolerances mean the same at every displacement.
-        free_angle = problem.parameters[0] / (n * problem.parameters[2])
+        free_angle = 1.0 if self._sliding else problem.parameters[0] / (n * problem.parameters[2])
         nlp: dict[str, Any] = {
             "x": problem.unknowns,
             "p": problem.parameters,
@@ -141,68 +152,77 @@ class ReferenceSolver:
         lagrangian = problem.objective + ca.dot(multipliers, constraints)
         slope = ca.gradient(lagrangian, problem.parameters)[0]
         self._cable_slope = ca.Function("cable_slope", [problem.unknowns, problem.parameters, multipliers], [slope])
-        bounded = self._touchable[:, :, 1:].ravel()
+        bounded = np.concatenate([np.ones(int(self._sliding), bool), self._touchable[:, :, 1:].ravel()])
         self._lower = np.concatenate([np.zeros(3 * n), np.where(bounded, 0.0, -np.inf)])
         self._upper = np.concatenate([np.zeros(3 * n), np.full(bounded.size, np.inf)])
 
-    def _parameters(self, cable: float) -> list[float]:
-        return [cable, self.robot.length_mm, self.robot.offset_mm, *self._shapes]
+    def _parameters(self, cable: float, length: float) -> list[float]:
+        return [cable, length, self.robot.offset_mm, *self._shapes]
 
     def _scale(self, cable: float) -> float:
-        return (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
+        return 1.0 if self._sliding else (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
 
     def _goal(self, point: _Point, cable: float) -> float:
-        touching = bool(self._forces(point).any())
+        touching = not self._sliding and bool(self._pushes(point).any())
         return max(cable, min(point.cable, PRETENSION)) if touching else cable
 
-    def _shape(self, cable: float, sines: np.ndarray) -> np.ndarray:
-        """Unknowns of the robot with given sines of its shear angles, by the geometry of its four-bar linkages."""
-        n, a, length = self.robot.segments, self.robot.offset_mm, self.robot.segment_mm
-        chords = length * np.sqrt(1 - sines**2) - np.sqrt((length - cable / n) ** 2 - (length * sines) ** 2)
-        turns = 2 * np.arcsin(chords / (2 * a))
+    def _shape(self, cable: float, length: float, coordinates: np.ndarray) -> np.ndarray:
+        """Unknowns of the robot with given reduced coordinates: angles of its arcs, or sines of its shear angles."""
+        n, a, segment = self.robot.segments, self.robot.offset_mm, length / self.robot.segments
+        if self._sliding:
+            turns, chords, shears = coordinates, segment * np.sinc(coordinates / (2 * np.pi)), np.zeros(n)
+        else:
+            sines = coordinates
+            rises = segment * np.sqrt(1 - sines**2) - np.sqrt((segment - cable / n) ** 2 - (segment * sines) ** 2)
+            turns, chords, shears = 2 * np.arcsin(rises / (2 * a)), np.full(n, segment), np.arcsin(sines)
         angles = np.concatenate([[0.0], -np.cumsum(turns)])
-        headings = angles[:-1] - turns / 2 + np.arcsin(sines)
-        backbone = np.cumsum(length * np.column_stack([-np.sin(headings), np.cos(headings)]), axis=0)
+        headings = angles[:-1] - turns / 2 + shears
+        backbone = np.cumsum(chords[:, None] * np.column_stack([-np.sin(headings), np.cos(headings)]), axis=0)
         disks = a * np.column_stack([np.cos(angles), np.sin(angles)])
         return np.concatenate([backbone.ravel(), (backbone + disks[1:]).ravel()])
 
-    def _free(self, cable: float) -> _Point:
-        unknowns = self._shape(cable, np.zeros(self.robot.segments))
-        return self._balanced(cable, unknowns, np.zeros(self._touchable[:, :, 1:].size))
+    def _free(self, cable: float, length: float) -> _Point:
+        """The shape that nothing touches."""
+        robot = self.robot.at(length)
+        angle = free_angle(robot, cable) if self._sliding else 0.0
+        unknowns = self._shape(cable, length, np.full(robot.segments, angle))
+        taut = [free_tension(robot, cable) / robot.stiffness] if self._sliding else []
+        return self._balanced(cable, length, unknowns, np.r_[taut, np.zeros(self._touchable[:, :, 1:].size)])
 
-    def _balanced(self, cable: float, unknowns: np.ndarray, forces: np.ndarray) -> _Point:
-        """A shape with multipliers of its gaps, and those of the equalities by least squares."""
-        derivatives = node_derivatives(self.robot, self.scene.kinds)
-        slope, _, equality_slopes, _, gap_slopes = (v.full() for v in derivatives(unknowns, self._parameters(cable)))
-        balance = gap_slopes.T @ forces - slope.ravel()
+    def _balanced(self, cable: float, length: float, unknowns: np.ndarray, pushes: np.ndarray) -> _Point:
+        """A shape with multipliers of its inequalities, and those of the equalities by least squares."""
+        derivatives = node_derivatives(self.robot, self.scene.kinds)(unknowns, self._parameters(cable, length))
+        slope, _, equality_slopes, _, gap_slopes = (value.full() for value in derivatives)
+        balance = gap_slopes.T @ pushes - slope.ravel()
         tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
-        return _Point(cable, unknowns, np.concatenate([tensions, -forces]))
+        return _Point(cable, length, unknowns, np.concatenate([tensions, -pushes]))
 
     def _start(self, equilibrium: Equilibrium) -> _Point:
         unknowns = np.concatenate([equilibrium.nodes[1:, :2].ravel(), equilibrium.cable_nodes[1:].ravel()])
-        return self._balanced(equilibrium.cable_mm, unknowns, equilibrium.multipliers[:, :, 1:].ravel())
+        return self._balanced(equilibrium.cable_mm, equilibrium.length_mm, unknowns, equilibrium.pushes)
 
-    def _solve(self, start: _Point, cable: float) -> _Point | None:
-        """The solution at another displacement, ``None`` where IPOPT does not converge to it or leaves the branch."""
-        if cable < SLACK:
-            return self._free(cable)
+    def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
+        """The solution under another command, ``None`` where IPOPT does not converge to it or leaves the branch."""
+        if cable < SLACK and not self._sliding:
+            return self._free(cable, length)
         scale = self._scale(cable)
-        guess = self._balanced(cable, self._shape(cable, self._pose(start.unknowns).sines), self._forces(start))
+        shape = self._shape(cable, length, self._pose(start.unknowns, start.length).coordinates)
+        guess = self._balanced(cable, length, shape, self._pushes(start))
         solution = self._ipopt(
             x0=guess.unknowns,
             lam_g0=guess.multipliers / scale,
-            p=self._parameters(cable),
+            p=self._parameters(cable, length),
             lbg=self._lower,
             ubg=self._upper,
         )
         unknowns = solution["x"].full().ravel()
         moved = np.linalg.norm((unknowns - start.unknowns).reshape(-1, 2), axis=1).max()
-        allowed = MOVE_OFFSET + MOVE_SLOPE * abs(cable - start.cable)
+        allowed = MOVE_OFFSET + MOVE_SLOPE * _apart(start, cable, length)
         stats = self._ipopt.stats()
         if not (stats["success"] and moved <= allowed):
             return None
         multipliers = solution["lam_g"].full().ravel() * scale
-        return self._settled(_Point(cable, unknowns, multipliers, stats["iter_count"]), solution["g"])
+        return self._settled(_Point(cable, length, unknowns, multipliers, stats["iter_count"]), solution["g"])
 
     def _settled(self, point: _Point, constraints: ca.DM) -> _Point:
         """Without the traces of the barrier: an interior-point method leaves every multiplier positive."""
@@ -215,25 +235,27 @@ class ReferenceSolver:
 
     def _limit(self, below: _Point, above: _Point) -> _Point:
         """The tension limit between two points of the branch, from below, by bisection."""
-        low, high = below, above.cable
-        while high - low.cable > CABLE_RESOLUTION:
-            middle = self._solve(low, (low.cable + high) / 2)
-            if middle is None:
+        present, high = below, 1.0
+        low, span = 0.0, _apart(below, above.cable, above.length)
+        while (high - low) * span > RESOLUTION:
+            middle = (low + high) / 2
+            point = self._between(below._replace(unknowns=present.unknowns), above.cable, above.length, middle)
+            if point is None:
                 break
-            if self._tension(middle) > self.robot.max_tension:
-                high = middle.cable
+            if self._tension(point) > self.robot.max_tension:
+                high = middle
             else:
-                low = middle
-        return low
+                present, low = point, middle
+        return present
 
     def _tension(self, point: _Point) -> float:
-        slope = self._cable_slope(point.unknowns, self._parameters(point.cable), point.multipliers)
-        return self.robot.stiffness * float(slope)
+        slope = self._cable_slope(point.unknowns, self._parameters(point.cable, point.length), point.multipliers)
+        return self.robot.rigidity * self.robot.segments / (2 * point.length) * float(slope)
 
-    def _forces(self, point: _Point) -> np.ndarray:
+    def _pushes(self, point: _Point) -> np.ndarray:
         return -point.multipliers[3 * self.robot.segments :]
 
-    def _pose(self, unknowns: np.ndarray) -> _Pose:
+    def _pose(self, unknowns: np.ndarray, length: float) -> _Pose:
         points = unknowns.reshape(2, self.robot.segments, 2)
         backbone = np.vstack([[0.0, 0.0], points[0]])
         cable = np.vstack([[self.robot.offset_mm, 0.0], points[1]])
@@ -242,16 +264,17 @@ class ReferenceSolver:
         turns = -np.diff(angles)
         unsheared = angles[:-1] - turns / 2
         sideways = -np.sum(segments * np.column_stack([np.cos(unsheared), np.sin(unsheared)]), axis=1)
-        return _Pose(backbone, cable, angles, turns, sideways / self.robot.segment_mm)
+        sines = sideways * self.robot.segments / length
+        return _Pose(backbone, cable, angles, turns, turns if self._sliding else sines)
 
     def _equilibrium(self, point: _Point, status: Status, iterations: int) -> Equilibrium:
-        pose = self._pose(point.unknowns)
+        pose = self._pose(point.unknowns, point.length)
         nodes = np.column_stack([pose.backbone, pose.angles])
         multipliers = np.zeros(self._touchable.shape)
-        multipliers[:, :, 1:] = self._forces(point).reshape(multipliers[:, :, 1:].shape)
+        multipliers[:, :, 1:] = self._pushes(point)[int(self._sliding) :].reshape(multipliers[:, :, 1:].shape)
         parts: list[Any] = [
-            [point.cable, self._tension(point), np.sum(pose.turns**2)],
-            pose.sines,
+            [point.cable, point.length, self._tension(point), np.sum(pose.turns**2)],
+            pose.coordinates,
             nodes,
             pose.cable,
             multipliers,
@@ -264,3 +287,8 @@ class ReferenceSolver:
         points = touching_points(self.robot, nodes)
         gaps = np.reshape([obstacle.gap(points) for obstacle in self.scene], self._touchable.shape)
         return np.where(self._touchable, gaps, np.inf)
+
+
+def _apart(point: _Point, cable: float, length: float) -> float:
+    """How far a command is, in steps of the cable [mm]."""
+    return max(abs(cable - point.cable), abs(length - point.length) / 2)

@@ -1,9 +1,10 @@
 """The robot: what the solver needs to know of it, validated once."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 LINES = ("backbone", "cable", "rim")
+CABLES = ("uniform", "sliding")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -11,12 +12,16 @@ class Robot:
     """A planar cable-driven continuum robot, clamped at the origin and pointing along +y, its cable on the +x side.
 
     Attributes:
-        length_mm: Length of the backbone, L0 [mm].
+        length_mm: Length of the backbone at rest, L0 [mm].
         segments: Number of segments n the backbone is divided into; nodes are 0 (clamped) to n.
         offset_mm: Distance a of the cable from the backbone [mm].
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tension, never the shape.
         max_tension: Cable tension the motor can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, half a turn of the tip.
+        cable: ``"uniform"``, the paper's: every segment takes an equal share of the cable displacement and shears.
+            ``"sliding"``: the cable slides through the disks without friction and can go slack, and segments are arcs
+            (Rao 2024); with more segments this robot tends to the elastica under a tendon of constant tension.
+        length_range_mm: Shortest and longest length the base can insert [mm]; ``None`` for a robot of fixed length.
         touch: The lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and
             ``"rim"``, the edge of the disks opposite to the cable.
         between: Number of points of each line, evenly spaced between every two nodes, that can touch as well.
@@ -31,12 +36,17 @@ class Robot:
     rigidity: float = 5000.0
     max_tension: float = 15.0
     max_cable_mm: float | None = None
+    cable: str = "uniform"
+    length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0
 
     def __post_init__(self) -> None:
         for name in ("length_mm", "offset_mm", "rigidity"):
             require_positive(name, getattr(self, name))
+        if self.cable not in CABLES:
+            raise ValueError(f"cable is {self.cable!r}; it must be one of {', '.join(CABLES)}")
+        self._check_lengths()
         object.__setattr__(self, "touch", tuple(self.touch))
         if not self.touch or len(set(self.touch)) != len(self.touch) or not set(self.touch) <= set(LINES):
             raise ValueError(f"touch is {self.touch}; it must name some of {LINES}, each once")
@@ -47,14 +57,24 @@ class Robot:
         if not (isinstance(self.segments, int) and 2 <= self.segments <= 4096):
             raise ValueError(f"segments is {self.segments!r}; it must be a whole number from 2 to 4096")
         if self.max_cable_mm is None:
-            object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, 0.5 * self.length_mm))
+            object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, 0.5 * self.lengths_mm[0]))
         require_positive("max_cable_mm", self.max_cable_mm)
-        bound = min(self.length_mm, 2 * self.segments * self.offset_mm)
+        bound = min(self.lengths_mm[0], 2 * self.segments * self.offset_mm)
         if not self.cable_limit_mm < bound:
             raise ValueError(
                 f"max_cable_mm is {self.max_cable_mm}; it must be below {bound} "
-                "(the backbone's length, and the disks' reach 2·n·a)"
+                "(the backbone's shortest length, and the disks' reach 2·n·a)"
             )
+
+    def _check_lengths(self) -> None:
+        if self.length_range_mm is None:
+            return
+        shortest, longest = self.length_range_mm
+        object.__setattr__(self, "length_range_mm", (float(shortest), float(longest)))
+        for bound in (shortest, longest):
+            require_positive("a bound of length_range_mm", bound)
+        if not shortest <= self.length_mm <= longest:
+            raise ValueError(f"length_mm is {self.length_mm}; it must lie in length_range_mm {self.length_range_mm}")
 
     @classmethod
     def prototype(cls, *, max_tension: float = 15.0, segments: int = 18) -> "Robot":
@@ -64,6 +84,34 @@ class Robot:
         free robot by about 8 mm of cable displacement.
         """
         return cls(length_mm=180.0, segments=segments, offset_mm=8.0, max_tension=max_tension)
+
+    def at(self, length_mm: float) -> "Robot":
+        """The same robot, inserted to a length at rest [mm].
+
+        Raises:
+            ValueError: If the length is outside its range.
+        """
+        if length_mm == self.length_mm:
+            return self
+        self.check_length(length_mm)
+        return replace(self, length_mm=length_mm)
+
+    def check_length(self, length_mm: float) -> None:
+        """Refuse a length outside its range.
+
+        Raises:
+            ValueError: Naming the value and the range.
+        """
+        shortest, longest = self.lengths_mm
+        if not shortest <= length_mm <= longest:
+            raise ValueError(
+                f"length_mm is {length_mm}; it must be from {shortest:.6g} to {longest:.6g} (robot.length_range_mm)"
+            )
+
+    @property
+    def lengths_mm(self) -> tuple[float, float]:
+        """Shortest and longest length of the backbone [mm]."""
+        return self.length_range_mm or (self.length_mm, self.length_mm)
 
     @property
     def segment_mm(self) -> float:
@@ -83,8 +131,8 @@ class Robot:
 
     @property
     def spacing_mm(self) -> float:
-        """Distance between neighbouring points of the backbone that can touch [mm]."""
-        return self.segment_mm / (self.between + 1)
+        """Largest distance between neighbouring points of the backbone that can touch [mm]."""
+        return self.lengths_mm[1] / self.segments / (self.between + 1)
 
     @property
     def stiffness(self) -> float:

@@ -46,15 +46,17 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     """Differentiate an equilibrium with respect to every parameter.
 
     Args:
-        equilibrium: A stable equilibrium with some cable pulled; the shear of a slack robot is not determined.
+        equilibrium: A stable equilibrium; with a uniform cable, some of it pulled, as a slack robot's shear is not
+            determined.
         active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier. Adding
             one that only just touches gives the derivative on the side where it is pressed.
 
     Raises:
-        ValueError: If the cable is slack, or ``active`` has the wrong shape.
+        ValueError: If a uniform cable is not pulled, or ``active`` has the wrong shape.
     """
     robot, scene = equilibrium.robot, equilibrium.scene
-    if not equilibrium.cable_mm > 0:
+    sliding = robot.cable == "sliding"
+    if not sliding and not equilibrium.cable_mm > 0:
         raise ValueError(f"cable_mm is {equilibrium.cable_mm}; it must be positive, for the shear to be determined")
     active = equilibrium.contact if active is None else active
     if active.shape != equilibrium.contact.shape:
@@ -62,7 +64,8 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
             f"active has shape {active.shape}; it must have that of the multipliers, {equilibrium.contact.shape}"
         )
     conditions, varied, loads, load_slopes = _derivatives(equilibrium)
-    kept = np.concatenate([np.ones(7 * robot.segments, bool), active[:, :, 1:].ravel()])
+    taut = [equilibrium.tension > 0] if sliding else []
+    kept = np.concatenate([np.ones(7 * robot.segments, bool), taut, active[:, :, 1:].ravel()]).astype(bool)
     slopes, varied = conditions[kept], varied[kept]
     count, unknowns = slopes.shape
     kkt = np.zeros((count, count))
@@ -73,19 +76,19 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     signed = varied.copy()
     signed[unknowns:] *= -1
     load_changes = (signed.T @ change + load_slopes).T
-    load_changes[LENGTH] -= loads / robot.length_mm  # of the stiffness, EI·n / 2 L0
+    load_changes[LENGTH] -= loads / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
     _turn_about_centres(equilibrium, change.T, load_changes)
 
     multipliers = np.zeros((len(loads), *active.shape))
     inner = np.zeros((len(loads), active[:, :, 1:].size))
-    inner[:, active[:, :, 1:].ravel()] = change[7 * robot.segments :].T
+    inner[:, active[:, :, 1:].ravel()] = change[7 * robot.segments + sum(taut) :].T
     multipliers[:, :, :, 1:] = inner.reshape(multipliers[:, :, :, 1:].shape)
     forces = load_changes[:, 2:].reshape(len(loads), len(scene), 4)[:, :, :2]
     return Sensitivity(
         nodes=_node_slopes(equilibrium, change[:unknowns].T),
         multipliers=multipliers,
-        tension=robot.stiffness * load_changes[:, CABLE],
-        forces=robot.stiffness * forces,
+        tension=equilibrium.stiffness * load_changes[:, CABLE],
+        forces=equilibrium.stiffness * forces,
     )
 
 

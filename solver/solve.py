@@ -35,11 +35,12 @@ class Solver:
         check_width(robot, scene)
         extents = [obstacle.extent for obstacle in scene]
         self._kernel = Kernel(
+            robot.cable == "sliding",
             robot.segments,
-            robot.segment_mm,
             robot.offset_mm,
-            robot.stiffness,
+            robot.rigidity,
             robot.max_tension,
+            robot.lengths_mm[1],
             list(robot.lines_mm),
             robot.between,
             [SHAPES[kind] for kind in scene.kinds],
@@ -47,31 +48,36 @@ class Solver:
             np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
             touchable.reshape(len(scene), len(robot.touch) * robot.positions),
         )
-        self._rest = self._follow(np.zeros(self._kernel.block_size), 0.0)
+        straight = np.zeros(self._kernel.block_size)
+        straight[1] = robot.length_mm
+        self._rest = self._follow(straight, 0.0, robot.length_mm)
         check_clear(self._rest)
 
     def rest(self) -> Equilibrium:
         """The straight, unactuated robot."""
         return self._rest
 
-    def step(self, equilibrium: Equilibrium, cable_mm: float) -> Equilibrium:
-        """Move the cable to a displacement, as far as tension and obstacles allow.
+    def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
+        """Move the cable to a displacement, and the base to an insertion, as far as tension and obstacles allow.
 
         Args:
             equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
             cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
+            length_mm: Commanded length of the backbone, within ``robot.length_range_mm`` [mm]; ``None`` keeps it. Both
+                commands are approached evenly.
 
         Returns:
-            The equilibrium reached; its ``status`` says how. While anything touches, the cable is not slackened below
-            a pretension of 0.05 mm, where the shape would be undetermined.
+            The equilibrium reached; its ``status`` says how. While anything touches, a uniform cable is not slackened
+            below a pretension of 0.05 mm, where the shape would be undetermined; without it such a robot jams where
+            insertion meets an obstacle.
 
         Raises:
-            ValueError: If the command is out of range or the equilibrium is another robot's or scene's.
+            ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
-        check_command(self.robot, self.scene, equilibrium, cable_mm)
-        return self._follow(equilibrium.block, cable_mm)
+        length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        return self._follow(equilibrium.block, cable_mm, length_mm)
 
-    def trace(self, equilibrium: Equilibrium, cable_mm: float) -> np.ndarray:
+    def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> np.ndarray:
         """Every shape accepted on the way of :meth:`step`, from the present one on, ``(k, n+1, 3)`` [mm, mm, rad].
 
         Shows what happens inside a step: its sub-steps, and the descent through a snap.
@@ -79,13 +85,13 @@ class Solver:
         Raises:
             ValueError: As :meth:`step`.
         """
-        check_command(self.robot, self.scene, equilibrium, cable_mm)
-        shapes = self._kernel.trace(equilibrium.block, cable_mm)
+        length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        shapes = self._kernel.trace(equilibrium.block, cable_mm, length_mm)
         return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
 
-    def _follow(self, block: np.ndarray, cable_mm: float) -> Equilibrium:
+    def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
-        status, iterations = self._kernel.step(block, cable_mm, reached)
+        status, iterations = self._kernel.step(block, cable_mm, length_mm, reached)
         return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
 
 
@@ -100,7 +106,7 @@ def check_width(robot: Robot, scene: Scene) -> None:
         if obstacle.nodes is None and width < robot.spacing_mm:
             raise ValueError(
                 f"{obstacle!r} is {width:.3g} mm wide and could slip between points {robot.spacing_mm:.3g} mm apart; "
-                f"give the robot between={math.ceil(robot.segment_mm / width) - 1} or more"
+                f"give the robot between={math.ceil(robot.lengths_mm[1] / robot.segments / width) - 1} or more"
             )
 
 
@@ -116,8 +122,10 @@ def check_clear(rest: Equilibrium) -> None:
             raise ValueError(f"{obstacle!r} overlaps the straight robot by {-gaps.min():.3g} mm at node {node}")
 
 
-def check_command(robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float) -> None:
-    """Refuse a command out of range and an equilibrium of another robot or scene.
+def check_command(
+    robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None
+) -> float:
+    """Refuse a command out of range and an equilibrium of another robot or scene; returns the length asked for.
 
     Raises:
         ValueError: Naming the value and the bound.
@@ -130,6 +138,10 @@ def check_command(robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm
         raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
     if equilibrium.scene is not scene and equilibrium.scene != scene:
         raise ValueError("the equilibrium is of another scene; step from rest() of this solver")
+    if length_mm is None:
+        return equilibrium.length_mm
+    robot.check_length(length_mm)
+    return length_mm
 
 
 def _filled(values: tuple[float, ...], size: int) -> tuple[float, ...]:

@@ -4,6 +4,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <memory>
 #include <stdexcept>
 #include <tuple>
 
@@ -54,36 +55,41 @@ void measure_gaps(int kind, const Input& parameters, const Input& points, const 
 
 class Kernel {
  public:
-  Kernel(int segments, double length, double offset, double stiffness, double max_tension,
-         const std::vector<double>& lines, int between, const Kinds& kinds,
-         const Input& parameters, const Input& extents, const Mask& touchable)
-      : branch_({segments, length, offset, stiffness, max_tension, lines, between},
-                read_obstacles(kinds, parameters, extents, touchable)) {}
-
-  std::size_t block_size() const { return branch_.block_size(); }
-
-  std::tuple<int, int> step(const Input& from, double target, const Output& to) {
-    expect(from.size());
-    expect(to.size());
-    const ccr::Status status = branch_.follow(from.data(), target, to.data());
-    return {static_cast<int>(status), branch_.iterations};
+  Kernel(bool sliding, int segments, double offset, double rigidity, double max_tension, double max_length,
+         const std::vector<double>& lines, int between, const Kinds& kinds, const Input& parameters,
+         const Input& extents, const Mask& touchable) {
+    const ccr::Robot robot{segments, offset, rigidity, max_tension, max_length, lines, between};
+    const auto obstacles = read_obstacles(kinds, parameters, extents, touchable);
+    if (sliding)
+      branch_ = std::make_unique<ccr::Branch<ccr::SlidingCable>>(robot, obstacles);
+    else
+      branch_ = std::make_unique<ccr::Branch<ccr::UniformCable>>(robot, obstacles);
   }
 
-  std::vector<double> trace(const Input& from, double target) {
+  std::size_t block_size() const { return branch_->block_size(); }
+
+  std::tuple<int, int> step(const Input& from, double cable, double length, const Output& to) {
     expect(from.size());
-    std::vector<double> shapes, to(branch_.block_size());
-    branch_.trace = &shapes;
-    branch_.follow(from.data(), target, to.data());
-    branch_.trace = nullptr;
+    expect(to.size());
+    const ccr::Status status = branch_->follow(from.data(), {cable, length}, to.data());
+    return {static_cast<int>(status), branch_->iterations};
+  }
+
+  std::vector<double> trace(const Input& from, double cable, double length) {
+    expect(from.size());
+    std::vector<double> shapes, to(branch_->block_size());
+    branch_->trace = &shapes;
+    branch_->follow(from.data(), {cable, length}, to.data());
+    branch_->trace = nullptr;
     return shapes;
   }
 
  private:
   void expect(std::size_t size) const {
-    if (size != branch_.block_size()) throw std::invalid_argument("block of the wrong size for this robot and scene");
+    if (size != branch_->block_size()) throw std::invalid_argument("block of the wrong size for this robot and scene");
   }
 
-  ccr::Branch branch_;
+  std::unique_ptr<ccr::Follower> branch_;
 };
 
 }  // namespace
@@ -94,12 +100,13 @@ NB_MODULE(_kernel, m) {
   m.def("measure_gaps", &measure_gaps, "kind"_a, "parameters"_a, "points"_a, "gaps"_a,
         "Write value, x and y slope of the gap of each point to one obstacle.");
   nb::class_<Kernel>(m, "Kernel", "Solver of one robot in one scene; holds scratch memory and no state between calls.")
-      .def(nb::init<int, double, double, double, double, const std::vector<double>&, int, const Kinds&, const Input&, const Input&, const Mask&>(), "segments"_a,
-           "length"_a, "offset"_a, "stiffness"_a, "max_tension"_a, "lines"_a, "between"_a, "kinds"_a, "parameters"_a, "extents"_a,
-           "touchable"_a)
+      .def(nb::init<bool, int, double, double, double, double, const std::vector<double>&, int, const Kinds&,
+                    const Input&, const Input&, const Mask&>(),
+           "sliding"_a, "segments"_a, "offset"_a, "rigidity"_a, "max_tension"_a, "max_length"_a, "lines"_a,
+           "between"_a, "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a)
       .def_prop_ro("block_size", &Kernel::block_size, "Length of an equilibrium's block.")
-      .def("step", &Kernel::step, "from_"_a, "target"_a, "to"_a,
-           "Follow the branch from one block to a cable displacement into another; returns (status, iterations).")
-      .def("trace", &Kernel::trace, "from_"_a, "target"_a,
+      .def("step", &Kernel::step, "from_"_a, "cable"_a, "length"_a, "to"_a,
+           "Follow the branch from one block to a cable displacement and length into another; returns (status, iterations).")
+      .def("trace", &Kernel::trace, "from_"_a, "cable"_a, "length"_a,
            "Node poses of every shape accepted on the way, flattened.");
 }

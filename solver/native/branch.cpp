@@ -7,82 +7,109 @@ namespace ccr {
 
 using namespace limits;
 
-Branch::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles)
+namespace {
+
+// How far apart two commands are, in steps of the cable [mm].
+double apart(const Command& a, const Command& b) {
+  return std::max(std::abs(a.cable - b.cable), std::abs(a.length - b.length) / 2);
+}
+
+Command between(const Command& a, const Command& b, double t) {
+  return {a.cable + t * (b.cable - a.cable), a.length + t * (b.length - a.length)};
+}
+
+}  // namespace
+
+template <class Model>
+Branch<Model>::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles)
     : newton_(robot, obstacles),
       nodes_(robot.segments + 1),
       levers_(robot.segments + 1),
       points_(robot.points()) {
-  present_.shear.resize(robot.segments);
+  present_.controls.resize(robot.segments);
   trial_ = present_;
 }
 
-std::size_t Branch::block_size() const {
-  const std::size_t n = present_.shear.size();
-  return 3 + n + 5 * (n + 1) + 2 * newton_.chain.contacts();
+template <class Model>
+std::size_t Branch<Model>::block_size() const {
+  const std::size_t n = present_.controls.size();
+  return 4 + n + 5 * (n + 1) + 2 * newton_.chain.contacts();
 }
 
-void Branch::load(const double* block) {
-  const std::size_t n = present_.shear.size();
-  present_.cable = block[0];
-  tension_ = block[1];
-  block += 3;
-  for (Control& shear : present_.shear) shear[0] = *block++;
+template <class Model>
+void Branch<Model>::load(const double* block) {
+  const std::size_t n = present_.controls.size();
+  present_.command = {block[0], block[1]};
+  tension_ = block[2];
+  block += 4;
+  for (Control& control : present_.controls) control[0] = *block++;
   for (std::size_t i = 0; i <= n; ++i) nodes_[i] = {{block[3 * i], block[3 * i + 1]}};
   block += 3 * (n + 1);
   for (std::size_t i = 0; i <= n; ++i, block += 2) levers_[i] = {{block[0] - nodes_[i][0], block[1] - nodes_[i][1]}};
   newton_.chain.look_around(nodes_);
   place_points(newton_.chain.robot(), nodes_, levers_, points_);
-  present_.active.count = 0;
+  ActiveSet& active = present_.active;
+  active.count = 0;
+  if (Model::kSliding && tension_ > 0) {
+    active.contact[0] = newton_.chain.contacts();
+    active.multiplier[0] = tension_ / newton_.chain.robot().stiffness(present_.command.length);
+    active.count = 1;
+  }
   for (int c = 0; c < newton_.chain.contacts(); ++c)
-    if (block[c] > 0 && present_.active.count < kMaxActive) {
-      present_.active.contact[present_.active.count] = c;
-      present_.active.multiplier[present_.active.count++] = block[c];
+    if (block[c] > 0 && active.count < kMaxActive) {
+      active.contact[active.count] = c;
+      active.multiplier[active.count++] = block[c];
     }
   settled_ = false;
 }
 
-void Branch::store(double* block) const {
-  const Chain& chain = newton_.chain;
-  const std::size_t n = present_.shear.size();
-  *block++ = present_.cable;
+template <class Model>
+void Branch<Model>::store(double* block) const {
+  const Chain<Model>& chain = newton_.chain;
+  const std::size_t n = present_.controls.size();
+  *block++ = present_.command.cable;
+  *block++ = present_.command.length;
   *block++ = tension_;
   *block++ = chain.objective();
-  for (const Control& shear : present_.shear) *block++ = shear[0];
-  for (const State& state : chain.states()) block = std::copy(state.v.begin(), state.v.end(), block);
+  for (const Control& control : present_.controls) *block++ = control[0];
+  for (const auto& state : chain.states()) block = std::copy_n(state.v.begin(), 3, block);
   for (std::size_t i = 0; i <= n; ++i)
     for (int k = 0; k < 2; ++k) *block++ = chain.states()[i][k] + chain.levers()[i][k];
   std::fill_n(block, chain.contacts(), 0.0);
-  for (int j = 0; j < present_.active.count; ++j) block[present_.active.contact[j]] = present_.active.multiplier[j];
+  for (int j = 0; j < present_.active.count; ++j)
+    if (present_.active.contact[j] < chain.contacts()) block[present_.active.contact[j]] = present_.active.multiplier[j];
   block += chain.contacts();
   chain.survey(block);
 }
 
-double Branch::measure_tension() const { return newton_.chain.robot().stiffness * newton_.chain.cable_slope(); }
-
-void Branch::remember() {
+template <class Model>
+void Branch<Model>::remember() {
   points_ = newton_.chain.points();
   if (!trace) return;
-  for (const State& s : newton_.chain.states()) trace->insert(trace->end(), s.v.begin(), s.v.end());
+  for (const auto& s : newton_.chain.states()) trace->insert(trace->end(), s.v.begin(), s.v.begin() + 3);
 }
 
-void Branch::accept() {
+template <class Model>
+void Branch<Model>::accept() {
   std::swap(present_, trial_);
   tension_ = trial_tension_;
   settled_ = true;
   remember();
 }
 
-void Branch::settle() {
+template <class Model>
+void Branch<Model>::settle() {
   if (settled_) return;
-  newton_.chain.evaluate(present_.shear, present_.cable);
+  newton_.chain.evaluate(present_.controls, present_.command);
   newton_.chain.reduced_gradient(present_.active);
-  tension_ = measure_tension();
+  tension_ = newton_.chain.tension(present_.active);
   settled_ = true;
 }
 
 // Whether every point came here from the last accepted shape without cutting through an obstacle or jumping.
-bool Branch::passable(double allowed) const {
-  const Chain& chain = newton_.chain;
+template <class Model>
+bool Branch<Model>::passable(double allowed) const {
+  const Chain<Model>& chain = newton_.chain;
   const int points = chain.robot().points();
   double farthest = 0;
   for (int k = 0; k < points; ++k) {
@@ -100,50 +127,63 @@ bool Branch::passable(double allowed) const {
   return true;
 }
 
-// Without contact the shear vanishes and the shape is known.
-bool Branch::attempt_free(double cable) {
-  if (trial_.active.count > 0) return false;
-  std::fill(trial_.shear.begin(), trial_.shear.end(), Control{});
-  return newton_.chain.evaluate(trial_.shear, cable) && newton_.chain.violation() == 0;
+template <class Model>
+bool Branch<Model>::attempt_free(const Command& command) {
+  if (newton_.chain.touching(trial_.active)) return false;
+  newton_.chain.relax(command, trial_.controls, trial_.active);
+  return newton_.chain.evaluate(trial_.controls, command) && newton_.chain.violation() <= kFeasibility;
 }
 
-// Leaves in `trial_` the equilibrium at another cable displacement, if it continues the branch from `present_`.
-Branch::Move Branch::attempt(double cable) {
+// Leaves in `trial_` the equilibrium under another command, if it continues the branch from `present_`.
+template <class Model>
+Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   settled_ = false;
   trial_ = present_;
-  trial_.cable = cable;
-  if (!attempt_free(cable)) {
-    if (cable <= 0) return Move::kRejected;
-    trial_.shear = present_.shear;
+  trial_.command = command;
+  if (!attempt_free(command)) {
+    if (!Model::kSliding && command.cable <= 0) return Move::kRejected;
+    trial_.controls = present_.controls;
+    trial_.active = present_.active;
     const Verdict verdict = newton_.solve(trial_);
     iterations += verdict.iterations;
     if (!verdict.converged) return Move::kRejected;
   }
-  if (!passable(kMoveOffset + kMoveSlope * std::abs(cable - present_.cable))) return Move::kRejected;
+  if (!passable(kMoveOffset + kMoveSlope * apart(present_.command, command))) return Move::kRejected;
   newton_.chain.reduced_gradient(trial_.active);
-  trial_tension_ = measure_tension();
-  const bool pulling = cable > present_.cable;
-  return pulling && trial_tension_ > newton_.chain.robot().max_tension ? Move::kOverTension : Move::kAccepted;
+  trial_tension_ = newton_.chain.tension(trial_.active);
+  const bool pulled = command.cable > present_.command.cable && command.length == present_.command.length;
+  const bool rising = pulled || (!releases(command) && trial_tension_ > tension_);
+  return rising && trial_tension_ > newton_.chain.robot().max_tension ? Move::kOverTension : Move::kAccepted;
+}
+
+// Whether a command only lets the cable out.
+template <class Model>
+bool Branch<Model>::releases(const Command& command) const {
+  return command.cable < present_.command.cable && command.length == present_.command.length;
 }
 
 // `present_` is below the tension limit, `trial_` above: close in from below by false position (Illinois), aiming into
 // the middle of the accepted band. False when the branch cannot be followed that far.
-bool Branch::approach_limit() {
+template <class Model>
+bool Branch<Model>::approach_limit() {
   const double aim = newton_.chain.robot().max_tension * (1 - kTensionBand / 2);
-  double high = trial_.cable, excess = trial_tension_ - aim, shortage = tension_ - aim;
+  const Command start = present_.command, end = trial_.command;
+  const double span = apart(start, end);
+  double low = 0, high = 1, excess = trial_tension_ - aim, shortage = tension_ - aim;  // fractions of the way
   Move last = Move::kRejected;
   for (int i = 0; i < kStallIterations && !at_limit(); ++i) {
-    const double width = high - present_.cable;
-    if (!(width > kCableResolution * high)) break;
-    const double cable = high - width * excess / (excess - shortage);
-    const Move move = attempt(std::clamp(cable, present_.cable + 1e-3 * width, high - 1e-3 * width));
+    const double width = high - low;
+    if (!(width * span > kCommandResolution)) break;
+    const double middle = std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
+    const Move move = attempt(between(start, end, middle));
     if (move == Move::kRejected) return false;
     if (move == Move::kAccepted) {
       accept();
+      low = middle;
       shortage = tension_ - aim;
       if (move == last) excess /= 2;
     } else {
-      high = trial_.cable;
+      high = middle;
       excess = trial_tension_ - aim;
       if (move == last) shortage /= 2;
     }
@@ -153,7 +193,8 @@ bool Branch::approach_limit() {
 }
 
 // The quadratic end of a descent, where Newton's method stays close and loses energy.
-bool Branch::finish() {
+template <class Model>
+bool Branch<Model>::finish() {
   const double energy = newton_.chain.objective();
   trial_ = present_;
   const Verdict verdict = newton_.solve(trial_);
@@ -165,8 +206,10 @@ bool Branch::finish() {
 }
 
 // The branch ends within the smallest step: descend from its end, feasible and slowly, to where the robot goes.
-Branch::End Branch::pass_end(double increment) {
+template <class Model>
+Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
   const Iterate start = present_;
+  const bool holding = !releases(command);  // the motor
   const std::vector<Position> start_points = points_;
   const std::size_t start_trace = trace ? trace->size() : 0;
   settled_ = false;
@@ -180,7 +223,7 @@ Branch::End Branch::pass_end(double increment) {
   };
 
   trial_ = present_;
-  trial_.cable += increment;
+  trial_.command = command;
   bool moved = newton_.measure(present_) && newton_.restore(trial_);
   for (int i = 0; i < kDescentIterations && moved && passable(kDescentMove); ++i) {
     std::swap(present_, trial_);
@@ -192,7 +235,7 @@ Branch::End Branch::pass_end(double increment) {
     }
     settled_ = false;
     settle();
-    if (increment > 0 && tension_ > newton_.chain.robot().max_tension) return undo(End::kOverTension);
+    if (holding && tension_ > newton_.chain.robot().max_tension) return undo(End::kOverTension);
     double farthest = 0;
     for (std::size_t k = 0; k < points_.size(); ++k)
       farthest = std::max(farthest, std::hypot(points_[k][0] - start_points[k][0], points_[k][1] - start_points[k][1]));
@@ -201,27 +244,38 @@ Branch::End Branch::pass_end(double increment) {
   return undo(End::kBlocked);
 }
 
-bool Branch::at_limit() const { return tension_ >= newton_.chain.robot().max_tension * (1 - kTensionBand); }
+template <class Model>
+bool Branch<Model>::at_limit() const { return tension_ >= newton_.chain.robot().max_tension * (1 - kTensionBand); }
 
-Status Branch::follow(double target) {
+// A robot that touches is not slackened below its pretension where the cable alone gives it its shape.
+template <class Model>
+double Branch<Model>::goal_cable(double target) const {
+  if (Model::kSliding || !newton_.chain.touching(present_.active)) return target;
+  return std::max(target, std::min(present_.command.cable, kPretension));
+}
+
+template <class Model>
+Status Branch<Model>::follow(const Command& target) {
   Status reached = Status::kConverged;
+  Command wanted = target;
   double step = kLargestStep;
   bool refined = false;  // the last attempt was rejected: do not grow again at once
-  for (int sub = 0, ends = 0; sub < kSubSteps && ends < kBranchEnds; ++sub) {
-    // A touching robot is not slackened below its pretension.
-    const double goal = present_.active.count > 0 ? std::max(target, std::min(present_.cable, kPretension)) : target;
-    const double remaining = goal - present_.cable;
+  const int steps = kSubSteps + static_cast<int>(2 * apart(present_.command, target) / kLargestStep);
+  for (int sub = 0, ends = 0; sub < steps && ends < kBranchEnds; ++sub) {
+    const Command goal = {goal_cable(wanted.cable), wanted.length};
+    const double remaining = apart(present_.command, goal);
     if (remaining == 0) {
       // A release may end in a snap to more tension than the motor holds: it yields until it holds again.
-      if (tension_ <= newton_.chain.robot().max_tension || present_.cable == 0) return reached;
-      target = std::max(present_.cable - kYield, 0.0);
+      if (tension_ <= newton_.chain.robot().max_tension || present_.command.cable == 0) return reached;
+      wanted.cable = std::max(present_.command.cable - kYield, 0.0);
       reached = Status::kStalled;
       continue;
     }
-    if (remaining > 0 && at_limit()) return Status::kStalled;
-    const double size = std::min(step, std::abs(remaining));
-    const double cable = size == std::abs(remaining) ? goal : present_.cable + std::copysign(size, remaining);
-    const Move move = attempt(cable);
+    if (goal.cable > present_.command.cable && goal.length == present_.command.length && at_limit())
+      return Status::kStalled;
+    const double size = std::min(step, remaining);
+    const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
+    const Move move = attempt(next);
     if (move == Move::kAccepted) {
       accept();
       step = refined ? size : std::min(2 * size, kLargestStep);
@@ -233,7 +287,7 @@ Status Branch::follow(double target) {
       step = size / 2;
       refined = true;
     } else {
-      const End end = pass_end(cable - present_.cable);
+      const End end = pass_end(next);
       if (end == End::kBlocked) return Status::kJammed;
       if (end == End::kOverTension) return Status::kStalled;
       if (end == End::kSnapped) reached = Status::kSnapped;
@@ -245,7 +299,8 @@ Status Branch::follow(double target) {
   return Status::kJammed;
 }
 
-Status Branch::follow(const double* from, double target, double* to) {
+template <class Model>
+Status Branch<Model>::follow(const double* from, const Command& target, double* to) {
   iterations = 0;
   load(from);
   if (trace) {
@@ -257,5 +312,8 @@ Status Branch::follow(const double* from, double target, double* to) {
   store(to);
   return status;
 }
+
+template class Branch<UniformCable>;
+template class Branch<SlidingCable>;
 
 }  // namespace ccr

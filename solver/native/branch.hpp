@@ -1,4 +1,4 @@
-// An equilibrium followed from cable displacement to cable displacement, as the robot would move.
+// An equilibrium followed from command to command, as the robot would move.
 #pragma once
 
 #include <cstddef>
@@ -11,19 +11,30 @@ namespace ccr {
 
 enum class Status { kConverged, kSnapped, kStalled, kJammed, kFailed };
 
-class Branch {
+// What is the same for all models of a robot.
+class Follower {
  public:
-  Branch(const Robot& robot, const std::vector<Obstacle>& obstacles);
+  virtual ~Follower() = default;
 
-  // An equilibrium as one block of numbers, in this order: cable, tension, objective; sine of the shear angle of
-  // each segment; x, y, angle of each node; x, y of each cable point; multiplier of each contact; gap of each contact.
-  std::size_t block_size() const;
+  // An equilibrium as one block of numbers, in this order: cable, length, tension, objective; coordinate of each
+  // segment; x, y, angle of each node; x, y of each cable point; multiplier of each contact; gap of each contact.
+  virtual std::size_t block_size() const = 0;
 
-  // Takes the cable from the equilibrium in one block towards `target` and writes the one reached to another.
-  Status follow(const double* from, double target, double* to);
+  // Takes the robot from the equilibrium in one block towards `target`, cable and length evenly, and writes the one
+  // reached to another.
+  virtual Status follow(const double* from, const Command& target, double* to) = 0;
 
   int iterations = 0;                    // of Newton's method in the last follow
   std::vector<double>* trace = nullptr;  // when set, receives (x, y, angle) of every node at every accepted shape
+};
+
+template <class Model>
+class Branch : public Follower {
+ public:
+  Branch(const Robot& robot, const std::vector<Obstacle>& obstacles);
+
+  std::size_t block_size() const override;
+  Status follow(const double* from, const Command& target, double* to) override;
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension };
@@ -31,25 +42,26 @@ class Branch {
 
   void load(const double* block);
   void store(double* block) const;
-  Status follow(double target);
-  Move attempt(double cable);
-  bool attempt_free(double cable);
+  Status follow(const Command& target);
+  double goal_cable(double target) const;
+  Move attempt(const Command& command);
+  bool attempt_free(const Command& command);
   bool approach_limit();
   bool at_limit() const;
-  End pass_end(double increment);
+  bool releases(const Command& command) const;
+  End pass_end(const Command& command);
   bool finish();
   bool passable(double allowed) const;
-  double measure_tension() const;
   void accept();
   void remember();
   void settle();
 
-  Newton newton_;
+  Newton<Model> newton_;
   Iterate present_, trial_;
   double tension_ = 0, trial_tension_ = 0;
   std::vector<Position> nodes_, levers_;  // of the block last read
   std::vector<Position> points_;          // of `present_`
-  bool settled_ = false;          // whether the chain is evaluated at `present_`
+  bool settled_ = false;                  // whether the chain is evaluated at `present_`
 };
 
 }  // namespace ccr

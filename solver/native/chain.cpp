@@ -8,8 +8,17 @@ namespace ccr {
 
 namespace {
 
-// Moment of the adjoint about the lower node: a turn of the segment moves the next node by (-dy, dx).
-double moment(const State& adjoint, const Bend& bend) { return adjoint[1] * bend.dx - adjoint[0] * bend.dy; }
+// A chord d in the base frame seen by the adjoint p of the node it leads to: its moment about the lower node, where a
+// turn moves the upper one by (-dy, dx), and -p·d.
+template <class Bend, int N>
+double moment(const Vec<N>& p, const Bend& bend) {
+  return p[1] * bend.dx - p[0] * bend.dy;
+}
+
+template <class Bend, int N>
+double inward(const Vec<N>& p, const Bend& bend) {
+  return -(p[0] * bend.dx + p[1] * bend.dy);
+}
 
 }  // namespace
 
@@ -31,7 +40,8 @@ void place_points(const Robot& robot, std::span<const Position> nodes, std::span
   }
 }
 
-Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
+template <class Model>
+Chain<Model>::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
     : robot_(robot),
       obstacles_(obstacles),
       bends_(robot.segments),
@@ -41,7 +51,7 @@ Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
       nodes_(robot.segments + 1),
       levers_(robot.segments + 1),
       points_(robot.points()),
-      gaps_(obstacles.size() * points_.size(), std::numeric_limits<double>::infinity()),
+      gaps_(obstacles.size() * points_.size() + Model::kSliding, std::numeric_limits<double>::infinity()),
       pulls_(robot.segments + 1),
       adjoints_(robot.segments),
       gradient_(robot.segments) {
@@ -51,41 +61,73 @@ Chain::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
     for (int k = 0; k < robot.positions(); ++k)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line / robot.offset});
   for (const double line : robot.lines) reach_ = std::max(reach_, std::abs(line));
-  reach_ += limits::kReach + (robot.between > 0 ? robot.length : 0);
+  reach_ += limits::kReach + (robot.between > 0 ? robot.max_length / robot.segments : 0);
 }
 
-void Chain::look_around(std::span<const Position> nodes) {
+template <class Model>
+void Chain<Model>::look_around(std::span<const Position> nodes) {
   std::copy(nodes.begin(), nodes.end(), origin_.begin());
   for (std::size_t j = 0; j < obstacles_.size(); ++j) clear_[j] = clearance(obstacles_[j], nodes) - reach_;
 }
 
-bool Chain::evaluate(const std::vector<Control>& shear, double cable) {
+template <class Model>
+bool Chain<Model>::evaluate(const std::vector<Control>& controls, const Command& command) {
   const int n = robot_.segments;
-  pull_ = cable / n;
+  pull_ = command.cable / n;
+  length_ = command.length / n;
   objective_ = steepest_ = 0;
-  bend_segments(n, shear[0].v.data(), pull_, robot_.length, robot_.offset, bends_.data());
+  Model::bend(n, controls[0].v.data(), pull_, length_, robot_.offset, bends_.data());
   states_[0] = {};
   levers_[0] = {{robot_.offset, 0}};
-  const double scale = robot_.length / robot_.offset;
+  const double scale = length_ / robot_.offset;
+  double widest = 0;
   for (int i = 0; i < n; ++i) {
-    Bend& bend = bends_[i];
+    auto& bend = bends_[i];
     const double c = levers_[i][0], s = levers_[i][1];  // of the lower disk, times the offset
     bend.dx = -scale * (s * bend.forward + c * bend.sideways);
     bend.dy = scale * (c * bend.forward - s * bend.sideways);
     levers_[i + 1] = {{c * bend.cosine + s * bend.sine, s * bend.cosine - c * bend.sine}};
-    states_[i + 1] = {{states_[i][0] + bend.dx, states_[i][1] + bend.dy, states_[i][2] - bend.angle}};
+    State& next = states_[i + 1];
+    next = states_[i];
+    next[0] += bend.dx;
+    next[1] += bend.dy;
+    next[2] -= bend.angle;
+    if constexpr (Model::kSliding) next[3] += bend.taken;
     objective_ += bend.angle * bend.angle;
     steepest_ = std::max(steepest_, std::abs(2 * bend.angle * bend.slope));
+    widest = std::max(widest, std::abs(bend.angle));
   }
-  if (!std::isfinite(objective_)) return false;
+  if (!std::isfinite(objective_) || (Model::kSliding && widest > limits::kWidestTurn)) return false;
   for (int i = 0; i <= n; ++i) nodes_[i] = {{states_[i][0], states_[i][1]}};
   place_points(robot_, nodes_, levers_, points_);
-  measure_gaps();
+  measure_gaps(Model::kSliding ? states_[n][Model::kState - 1] - command.cable : 0);
   return true;
 }
 
+template <class Model>
+void Chain<Model>::relax(const Command& command, std::vector<Control>& controls, ActiveSet& active) const {
+  active.count = 0;
+  Control each{};
+  if constexpr (Model::kSliding) {
+    if (command.cable > 0) {
+      const double pull = command.cable / robot_.segments, length = command.length / robot_.segments;
+      typename Model::Bend bend;
+      each[0] = pull / robot_.offset;
+      for (int i = 0; i < limits::kRelaxIterations; ++i) {
+        Model::bend(1, each.v.data(), pull, length, robot_.offset, &bend);
+        each[0] -= (bend.taken - pull) / bend.taken_slope;
+      }
+      active.contact[0] = contacts();
+      active.multiplier[0] = 2 * each[0] / bend.taken_slope;
+      active.count = 1;
+    }
+  }
+  std::fill(controls.begin(), controls.end(), each);
+}
+
 // Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
-void Chain::measure_gaps() {
+template <class Model>
+void Chain<Model>::measure_gaps(double slack) {
   const int n = robot_.segments, stride = robot_.between + 1;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
@@ -102,7 +144,7 @@ void Chain::measure_gaps() {
     for (int i = 0; i <= n; ++i) {
       const double distance = clearance(obstacle, nodes_[i]) - reach_;
       if (distance > 0) {
-        i += static_cast<int>(std::min(distance / robot_.length, static_cast<double>(n)));
+        i += static_cast<int>(std::min(distance / length_, static_cast<double>(n)));
         continue;
       }
       for (int start = i * stride; start < robot_.points(); start += robot_.positions())
@@ -113,9 +155,14 @@ void Chain::measure_gaps() {
         }
     }
   }
+  if constexpr (Model::kSliding) {
+    gaps_[contacts()] = slack;
+    near_.push_back(contacts());
+  }
 }
 
-void Chain::survey(double* gaps) const {
+template <class Model>
+void Chain<Model>::survey(double* gaps) const {
   for (const Obstacle& obstacle : obstacles_) {
     ccr::measure_gaps(obstacle, points_, gaps);
     for (std::size_t k = 0; k < points_.size(); ++k)
@@ -124,7 +171,10 @@ void Chain::survey(double* gaps) const {
   }
 }
 
-System::Force Chain::slope(int contact) const {
+template <class Model>
+Chain<Model>::Force Chain<Model>::slope(int contact) const {
+  if constexpr (Model::kSliding)
+    if (contact == contacts()) return {robot_.segments, false, {{0, 0, 0, 1}}, {}};
   const Gap gap = measure_gap(obstacle(contact), point(contact));
   const Site& site = this->site(contact);
   const auto share = [&](double weight, const Position& lever) {
@@ -136,82 +186,126 @@ System::Force Chain::slope(int contact) const {
   return {site.node, true, share(1 - t, levers_[site.node]), share(t, levers_[site.node + 1])};
 }
 
-double Chain::violation() const {
+template <class Model>
+double Chain<Model>::lever_arm(int contact) const {
+  if (contact == contacts()) return robot_.offset * robot_.segments;
+  const Site& site = this->site(contact);
+  return length_ * (site.node + (site.fraction > 0));
+}
+
+template <class Model>
+bool Chain<Model>::touching(const ActiveSet& active) const {
+  return active.count > 1 || (active.count == 1 && active.contact[0] < contacts());
+}
+
+template <class Model>
+double Chain<Model>::violation() const {
   double worst = 0;
   for (const int contact : near_) worst = std::max(worst, -gaps_[contact]);
   return worst;
 }
 
-void Chain::reduced_gradient(const ActiveSet& active) {
+template <class Model>
+double Chain<Model>::tolerance() const {
+  const double free = pull_ / robot_.offset;  // angle of a segment that nothing touches
+  const double scale = Model::kSliding ? steepest_ : free * free;
+  return limits::kStationarity * scale + limits::kRoundoff * steepest_;
+}
+
+template <class Model>
+void Chain<Model>::reduced_gradient(const ActiveSet& active) {
   std::fill(pulls_.begin(), pulls_.end(), State{});
   for (int j = 0; j < active.count; ++j) {
-    const System::Force force = slope(active.contact[j]);
-    for (int k = 0; k < 3; ++k) {
+    const Force force = slope(active.contact[j]);
+    for (int k = 0; k < Model::kState; ++k) {
       pulls_[force.node][k] += active.multiplier[j] * force.here[k];
       if (force.split) pulls_[force.node + 1][k] += active.multiplier[j] * force.next[k];
     }
   }
   State p;
   for (int i = robot_.segments - 1; i >= 0; --i) {
-    const Bend& bend = bends_[i];
+    const auto& bend = bends_[i];
     p -= pulls_[i + 1];
     adjoints_[i] = p;
     const double turn = moment(p, bend);
     gradient_[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
+    if constexpr (Model::kSliding) gradient_[i][0] += p[3] * bend.taken_slope - inward(p, bend) * bend.stretch;
     p[2] += turn;
   }
 }
 
-void Chain::curvature(const ActiveSet& active, System& system) const {
+template <class Model>
+void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
   for (int i = 0; i < robot_.segments; ++i) {
-    const Bend& bend = bends_[i];
+    const auto& bend = bends_[i];
     const State& p = adjoints_[i];
-    const double turn = moment(p, bend);
-    const double inward = -(p[0] * bend.dx + p[1] * bend.dy);
-    const double heading = bend.heading_slope;
-    System::Stage& stage = system.stages[i];
+    const double turn = moment(p, bend), inward = ccr::inward(p, bend), heading = bend.heading_slope;
+    typename System::Stage& stage = system.stages[i];
     stage.a = {-bend.dy, bend.dx};
-    stage.b = {{-bend.dy * heading, bend.dx * heading, -bend.slope}};
+    stage.b[0] = -bend.dy * heading;
+    stage.b[1] = bend.dx * heading;
+    stage.b[2] = -bend.slope;
     system.node_hessian[i] = {};
     system.node_hessian[i](2, 2) = inward;
     stage.hux = {{0, 0, inward * heading}};
     stage.huu = {{2 * (bend.slope * bend.slope + bend.angle * bend.curvature) + inward * heading * heading +
                   turn * bend.heading_curvature - p[2] * bend.curvature}};
+    if constexpr (Model::kSliding) {
+      stage.b[0] += bend.dx * bend.stretch;
+      stage.b[1] += bend.dy * bend.stretch;
+      stage.b[3] = bend.taken_slope;
+      stage.hux[2] += turn * bend.stretch;
+      stage.huu[0] += p[3] * bend.taken_curvature + 2 * turn * bend.stretch * heading - inward * bend.stretch_slope;
+    }
   }
   system.node_hessian[robot_.segments] = {};
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
+    if (contact == contacts()) continue;  // linear in the state
     const Gap gap = measure_gap(obstacle(contact), point(contact));
     const Site& site = this->site(contact);
     // Its Hessian in the states of the nodes beside it: J_aᵀ C J_b, and the curvature of the turn of each lever.
     const auto motion = [&](double weight, const Position& lever) {
-      return Mat<2, 3>{{weight, 0, -weight * site.lever * lever[1], 0, weight, weight * site.lever * lever[0]}};
+      Mat<2, Model::kState> slope;
+      slope(0, 0) = slope(1, 1) = weight;
+      slope(0, 2) = -weight * site.lever * lever[1];
+      slope(1, 2) = weight * site.lever * lever[0];
+      return slope;
     };
     const auto turn = [&](double weight, const Position& lever) {
       return weight * site.lever * (gap.x * lever[0] + gap.y * lever[1]);
     };
     const double t = site.fraction, force = -active.multiplier[j];
     const Mat<2, 2> c = {{force * gap.xx, force * gap.xy, force * gap.xy, force * gap.yy}};
-    const Mat<2, 3> here = motion(1 - t, levers_[site.node]);
+    const auto here = motion(1 - t, levers_[site.node]);
     system.node_hessian[site.node] += transpose_times(here, times(c, here));
     system.node_hessian[site.node](2, 2) -= force * turn(1 - t, levers_[site.node]);
     if (t == 0) continue;
-    const Mat<2, 3> next = motion(t, levers_[site.node + 1]);
+    const auto next = motion(t, levers_[site.node + 1]);
     system.node_hessian[site.node + 1] += transpose_times(next, times(c, next));
     system.node_hessian[site.node + 1](2, 2) -= force * turn(t, levers_[site.node + 1]);
     system.couple(site.node, transpose_times(here, times(c, next)));
   }
 }
 
-double Chain::cable_slope() const {
-  double slope = 0;
-  for (int i = 0; i < robot_.segments; ++i) {
-    const Bend& bend = bends_[i];
-    const State& p = adjoints_[i];
-    const double turn = moment(p, bend);
-    slope += bend.pull_slope * (2 * bend.angle - turn / 2 - p[2]);
+template <class Model>
+double Chain<Model>::tension(const ActiveSet& active) const {
+  double slope = 0;  // of the energy in the cable displacement, over the stiffness
+  if constexpr (Model::kSliding) {
+    for (int j = 0; j < active.count; ++j)
+      if (active.contact[j] == contacts()) slope = active.multiplier[j];
+    return stiffness() * slope;
+  } else {
+    for (int i = 0; i < robot_.segments; ++i) {
+      const auto& bend = bends_[i];
+      const State& p = adjoints_[i];
+      slope += bend.pull_slope * (2 * bend.angle - moment(p, bend) / 2 - p[2]);
+    }
+    return stiffness() * (slope / robot_.segments);
   }
-  return slope / robot_.segments;
 }
+
+template class Chain<UniformCable>;
+template class Chain<SlidingCable>;
 
 }  // namespace ccr

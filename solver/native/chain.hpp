@@ -15,46 +15,56 @@ namespace ccr {
 
 struct Robot {
   int segments;
-  double length;       // of one segment [mm]
   double offset;       // cable from backbone [mm]
-  double stiffness;    // EI / 2 l0 [N mm]
+  double rigidity;     // EI [N mm^2]
   double max_tension;  // [N]
+  double max_length;   // of the backbone [mm]
   std::vector<double> lines;  // distance of each line of points that can touch, from the backbone towards the cable [mm]
   int between;                // points of a line between two nodes
 
   int positions() const { return segments * (between + 1) + 1; }  // of a line
   int points() const { return static_cast<int>(lines.size()) * positions(); }
+  double stiffness(double length) const { return rigidity * segments / (2 * length); }  // EI / 2 l0 [N mm]
 };
 
-using State = Vec<3>;    // x, y, disk angle
-using Control = Vec<1>;  // sine of the shear angle
+struct Command {
+  double cable, length;  // displacement of the cable, length of the backbone [mm]
+};
+
+using Control = Vec<1>;  // the coordinate of a segment
 
 // Dynamics of a segment in its lower state: the identity, and the motion of the next node per turn of the disk.
 struct Turn {
   double x, y;
 };
 
-inline State times(const Turn& a, State s) {
+template <int N>
+Vec<N> times(const Turn& a, Vec<N> s) {
   s[0] += a.x * s[2];
   s[1] += a.y * s[2];
   return s;
 }
 
-template <int R>
-Mat<R, 3> times(Mat<R, 3> m, const Turn& a) {
+template <int R, int N>
+Mat<R, N> times(Mat<R, N> m, const Turn& a) {
   for (int r = 0; r < R; ++r) m(r, 2) += m(r, 0) * a.x + m(r, 1) * a.y;
   return m;
 }
 
-template <int C>
-Mat<3, C> transpose_times(const Turn& a, Mat<3, C> m) {
+template <int N, int C>
+Mat<N, C> transpose_times(const Turn& a, Mat<N, C> m) {
   for (int c = 0; c < C; ++c) m(2, c) += a.x * m(0, c) + a.y * m(1, c);
   return m;
 }
 
-using System = Riccati<3, 1, Turn>;
+template <class Model>
+using State = Vec<Model::kState>;
 
-// Contacts that carry a multiplier. A contact is (obstacle * lines + line) * positions + position.
+template <class Model>
+using System = Riccati<Model::kState, 1, Turn>;
+
+// Contacts that carry a multiplier. A contact is (obstacle * lines + line) * positions + position; the one after the last
+// is a sliding cable, whose gap is its slack.
 struct ActiveSet {
   int count = 0;
   std::array<int, limits::kMaxActive> contact;
@@ -73,30 +83,40 @@ struct ActiveSet {
 void place_points(const Robot& robot, std::span<const Position> nodes, std::span<const Position> levers,
                   std::vector<Position>& points);
 
+template <class Model>
 class Chain {
  public:
+  using State = ccr::State<Model>;
+  using System = ccr::System<Model>;
+  using Force = typename System::Force;
+
   Chain(const Robot& robot, const std::vector<Obstacle>& obstacles);
 
   // Measures how far each obstacle is from a shape, so that it can be passed over while the robot stays close to it.
   void look_around(std::span<const Position> nodes);
 
-  // Shape at a cable displacement; false when a shear leaves the range of the segment law.
-  bool evaluate(const std::vector<Control>& shear, double cable);
+  // Shape under a command; false when a coordinate leaves the range of the segment law.
+  bool evaluate(const std::vector<Control>& controls, const Command& command);
 
-  // Slope of the Lagrangian J - Σ λ c with respect to the shear, with the adjoints it is made of.
+  // The shape that no obstacle touches, which is known, and what holds it.
+  void relax(const Command& command, std::vector<Control>& controls, ActiveSet& active) const;
+
+  // Slope of the Lagrangian J - Σ λ c with respect to the controls, with the adjoints it is made of.
   void reduced_gradient(const ActiveSet& active);
-  // Exact Hessian of the Lagrangian, and its slope in the cable displacement; both follow reduced_gradient.
+  // Exact Hessian of the Lagrangian, and the tension of the cable; both follow reduced_gradient.
   void curvature(const ActiveSet& active, System& system) const;
-  double cable_slope() const;
+  double tension(const ActiveSet& active) const;
 
   const Robot& robot() const { return robot_; }
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
-  int contacts() const { return static_cast<int>(gaps_.size()); }
+  int contacts() const { return static_cast<int>(obstacles_.size() * points_.size()); }
+  bool touching(const ActiveSet& active) const;  // any obstacle
 
   double objective() const { return objective_; }
   double violation() const;  // largest -gap, at least 0
   double steepest() const { return steepest_; }  // largest slope of the objective alone
-  double free_angle() const { return pull_ / robot_.offset; }
+  double tolerance() const;  // of the slope of the Lagrangian
+  double stiffness() const { return robot_.stiffness(length_ * robot_.segments); }
   const std::vector<State>& states() const { return states_; }
   const std::vector<Position>& levers() const { return levers_; }  // cable point from its backbone point
   const std::vector<Position>& points() const { return points_; }  // (line, position)
@@ -105,7 +125,8 @@ class Chain {
   const std::vector<double>& gaps() const { return gaps_; }
   bool far(int obstacle, double motion) const { return clear_[obstacle] > drift_ + motion; }  // even after this motion
   void survey(double* gaps) const;  // of every contact, whether within reach or not
-  System::Force slope(int contact) const;  // of a gap with respect to the states of the nodes beside it
+  Force slope(int contact) const;  // of a gap with respect to the states of the nodes beside it
+  double lever_arm(int contact) const;  // of its motion per unit of a control, about [mm]
   const std::vector<Control>& gradient() const { return gradient_; }
 
  private:
@@ -118,13 +139,14 @@ class Chain {
   const Obstacle& obstacle(int contact) const { return obstacles_[contact / points_.size()]; }
   const Position& point(int contact) const { return points_[contact % points_.size()]; }
   const Site& site(int contact) const { return sites_[contact % points_.size()]; }
-  void measure_gaps();
+  void measure_gaps(double slack);
 
   Robot robot_;
   std::vector<Obstacle> obstacles_;
   double reach_ = 0;  // from a node, within which its points may be near an obstacle
-  double pull_ = 0, objective_ = 0, steepest_ = 0;
-  std::vector<Bend> bends_;
+  double pull_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
+  double objective_ = 0, steepest_ = 0;
+  std::vector<typename Model::Bend> bends_;
   std::vector<Position> origin_;  // nodes of the shape looked around from
   std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach
   double drift_ = 0;              // how far they have

@@ -9,36 +9,42 @@ namespace ccr {
 
 using namespace limits;
 
-void Direction::add(double scale, const Direction& other) {
-  for (std::size_t i = 0; i < shear.size(); ++i) shear[i][0] += scale * other.shear[i][0];
+template <class Model>
+void Direction<Model>::add(double scale, const Direction& other) {
+  for (std::size_t i = 0; i < controls.size(); ++i) controls[i][0] += scale * other.controls[i][0];
   for (std::size_t i = 0; i < states.size(); ++i)
-    for (int k = 0; k < 3; ++k) states[i][k] += scale * other.states[i][k];
+    for (int k = 0; k < Model::kState; ++k) states[i][k] += scale * other.states[i][k];
 }
 
-Contacts::Contacts(int segments)
+template <class Model>
+Contacts<Model>::Contacts(int segments)
     : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments)), loads_(kMaxActive + 1) {}
 
-System::Load Contacts::load(const Chain& chain, int contact, int j) {
+template <class Model>
+Contacts<Model>::Load Contacts<Model>::load(const Chain& chain, int contact, int j) {
   slopes_[j] = chain.slope(contact);
-  return {nullptr, slopes_[j], responses_[j].shear.data(), responses_[j].states.data()};
+  return {nullptr, slopes_[j], responses_[j].controls.data(), responses_[j].states.data()};
 }
 
 // What the penalty on the active gaps adds to a step while they are not closed.
-void Contacts::penalize(const Chain& chain, const std::vector<double>& penalty, const ActiveSet& active,
+template <class Model>
+void Contacts<Model>::penalize(const Chain& chain, const std::vector<double>& penalty, const ActiveSet& active,
                         Direction& step) const {
   for (int j = 0; j < active.count; ++j)
     if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
 }
 
 // Takes a contact out, with its slope and response; `responses` counts those in use.
-void Contacts::release(ActiveSet& active, int j, int responses) {
+template <class Model>
+void Contacts<Model>::release(ActiveSet& active, int j, int responses) {
   std::rotate(slopes_.begin() + j, slopes_.begin() + j + 1, slopes_.begin() + responses);
   std::rotate(responses_.begin() + j, responses_.begin() + j + 1, responses_.begin() + responses);
   active.drop(j);
 }
 
 // Cholesky factor of ∇cᵀH⁻¹∇c over the active gaps; false where they depend on each other.
-bool Contacts::factor(const ActiveSet& active) {
+template <class Model>
+bool Contacts<Model>::factor(const ActiveSet& active) {
   for (int j = 0; j < active.count; ++j)
     for (int i = j; i < active.count; ++i) {
       const double entry = along(i, responses_[j]);
@@ -50,7 +56,8 @@ bool Contacts::factor(const ActiveSet& active) {
   return true;
 }
 
-void Contacts::apply_inverse(int count, Column& x) const {
+template <class Model>
+void Contacts<Model>::apply_inverse(int count, Column& x) const {
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < i; ++k) x[i] -= gram_[i][k] * x[k];
     x[i] /= gram_[i][i];
@@ -62,7 +69,8 @@ void Contacts::apply_inverse(int count, Column& x) const {
 }
 
 // Change of the multipliers that closes the active gaps.
-Contacts::Column Contacts::closing(const Chain& chain, const ActiveSet& active, const Direction& step) const {
+template <class Model>
+Contacts<Model>::Column Contacts<Model>::closing(const Chain& chain, const ActiveSet& active, const Direction& step) const {
   Column change;
   for (int j = 0; j < active.count; ++j)
     change[j] = -chain.gaps()[active.contact[j]] - along(j, step);
@@ -70,7 +78,8 @@ Contacts::Column Contacts::closing(const Chain& chain, const ActiveSet& active, 
   return change;
 }
 
-void Contacts::push(const Column& change, ActiveSet& active, Direction& step) const {
+template <class Model>
+void Contacts<Model>::push(const Column& change, ActiveSet& active, Direction& step) const {
   for (int j = 0; j < active.count; ++j) {
     active.multiplier[j] += change[j];
     step.add(change[j], responses_[j]);
@@ -78,7 +87,8 @@ void Contacts::push(const Column& change, ActiveSet& active, Direction& step) co
 }
 
 // Closes the active gaps, releasing those whose multiplier would turn negative.
-void Contacts::settle(const Chain& chain, ActiveSet& active, Direction& step) {
+template <class Model>
+void Contacts<Model>::settle(const Chain& chain, ActiveSet& active, Direction& step) {
   while (active.count > 0) {
     int lowest;
     const auto begin = active.multiplier.begin(), end = begin + active.count;
@@ -100,10 +110,11 @@ void Contacts::settle(const Chain& chain, ActiveSet& active, Direction& step) {
 }
 
 // Adds a violated gap by dual steps: its multiplier grows until it is closed, releasing whatever turns negative.
-bool Contacts::admit(const Chain& chain, System& system, int contact, ActiveSet& active, Direction& step) {
+template <class Model>
+bool Contacts<Model>::admit(const Chain& chain, System& system, int contact, ActiveSet& active, Direction& step) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   if (active.count == kMaxActive) return false;
-  const System::Load newcomer = load(chain, contact, active.count);
+  const Load newcomer = load(chain, contact, active.count);
   system.respond({&newcomer, 1});
   double multiplier = 0;
   for (;;) {
@@ -145,15 +156,16 @@ bool Contacts::admit(const Chain& chain, System& system, int contact, ActiveSet&
   }
 }
 
-int Contacts::most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const {
+template <class Model>
+int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const {
   double reach = 0;  // of any point under the step
-  for (const State& d : step.states)
+  for (const State<Model>& d : step.states)
     reach = std::max(reach, std::abs(d[0]) + std::abs(d[1]) + chain.robot().offset * std::abs(d[2]));
   int worst = -1;
   double lowest = -kFeasibility / 2;
   for (const int c : chain.near()) {
     const double gap = chain.gaps()[c];
-    if (gap > 2 * reach) continue;
+    if (gap > 2 * reach && c < chain.contacts()) continue;
     const double predicted = gap + chain.slope(c).along(step.states);
     const auto end = active.contact.begin() + active.count;
     if (predicted < lowest && std::find(active.contact.begin(), end, c) == end) {
@@ -164,15 +176,16 @@ int Contacts::most_violated(const Chain& chain, const ActiveSet& active, const D
   return worst;
 }
 
-bool Contacts::solve(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
+template <class Model>
+bool Contacts<Model>::solve(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
                      ActiveSet& active, Direction& step) {
   int count = 0;
   for (; count < active.count; ++count) loads_[count] = load(chain, active.contact[count], count);
   if (slope) {
-    loads_[count++] = {slope, {}, step.shear.data(), step.states.data()};
+    loads_[count++] = {slope, {}, step.controls.data(), step.states.data()};
   } else {
-    std::fill(step.shear.begin(), step.shear.end(), Control{});
-    std::fill(step.states.begin(), step.states.end(), State{});
+    std::fill(step.controls.begin(), step.controls.end(), Control{});
+    std::fill(step.states.begin(), step.states.end(), State<Model>{});
   }
   system.respond(std::span(loads_).first(count));
   penalize(chain, penalty, active, step);
@@ -185,9 +198,10 @@ bool Contacts::solve(const Chain& chain, System& system, const Control* slope, c
   return false;
 }
 
-bool Contacts::correct(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
+template <class Model>
+bool Contacts<Model>::correct(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
                        ActiveSet& active, Direction& step) {
-  const System::Load load{slope, {}, step.shear.data(), step.states.data()};
+  const Load load{slope, {}, step.controls.data(), step.states.data()};
   system.respond({&load, 1});
   penalize(chain, penalty, active, step);
   if (!factor(active)) return false;
@@ -195,5 +209,10 @@ bool Contacts::correct(const Chain& chain, System& system, const Control* slope,
   const auto end = active.multiplier.begin() + active.count;
   return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
 }
+
+template struct Direction<UniformCable>;
+template struct Direction<SlidingCable>;
+template class Contacts<UniformCable>;
+template class Contacts<SlidingCable>;
 
 }  // namespace ccr

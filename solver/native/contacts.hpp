@@ -8,17 +8,25 @@
 
 namespace ccr {
 
+template <class Model>
 struct Direction {
-  explicit Direction(int segments) : shear(segments), states(segments + 1) {}
-  std::vector<Control> shear;
-  std::vector<State> states;
+  explicit Direction(int segments) : controls(segments), states(segments + 1) {}
+  std::vector<Control> controls;
+  std::vector<State<Model>> states;
 
   void add(double scale, const Direction& other);
 };
 
 // Dual active-set method: every intermediate point minimises the model on its active set with multipliers >= 0.
+template <class Model>
 class Contacts {
  public:
+  using Chain = ccr::Chain<Model>;
+  using Direction = ccr::Direction<Model>;
+  using System = ccr::System<Model>;
+  using Force = typename System::Force;
+  using Load = typename System::Load;
+
   Contacts(int segments);
 
   // The step that minimises the model at `chain` within every linearised gap. On entry `active` holds the present
@@ -38,7 +46,7 @@ class Contacts {
   double along(int j, const Direction& d) const {
     return slopes_[j].along(d.states);
   }
-  System::Load load(const Chain& chain, int contact, int j);
+  Load load(const Chain& chain, int contact, int j);
   void penalize(const Chain& chain, const std::vector<double>& penalty, const ActiveSet& active, Direction& step) const;
   void release(ActiveSet& active, int j, int responses);
   bool factor(const ActiveSet& active);
@@ -50,9 +58,9 @@ class Contacts {
   int most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const;
 
   // Of the active gaps in their order, then of one that is being admitted.
-  std::vector<System::Force> slopes_;
+  std::vector<Force> slopes_;
   std::vector<Direction> responses_;  // H⁻¹∇c
-  std::vector<System::Load> loads_;
+  std::vector<Load> loads_;
   std::array<Column, limits::kMaxActive> gram_;
 };
 

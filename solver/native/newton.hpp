@@ -1,4 +1,4 @@
-// Newton's method for one equilibrium at a fixed cable displacement, near it and far from it.
+// Newton's method for one equilibrium under a fixed command, near it and far from it.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 namespace ccr {
 
 struct Iterate {
-  double cable = 0;
-  std::vector<Control> shear;
+  Command command{};
+  std::vector<Control> controls;
   ActiveSet active;
 };
 
@@ -19,6 +19,7 @@ struct Verdict {
   int iterations = 0;
 };
 
+template <class Model>
 class Newton {
  public:
   Newton(const Robot& robot, const std::vector<Obstacle>& obstacles);
@@ -36,7 +37,7 @@ class Newton {
   // Smallest motion that closes the active gaps exactly and meets every other; false when there is none nearby.
   bool restore(Iterate& at);
 
-  Chain chain;  // evaluated at the last iterate
+  Chain<Model> chain;  // evaluated at the last iterate
 
  private:
   bool equilibrium(const ActiveSet& active) const;
@@ -47,13 +48,13 @@ class Newton {
   void shape_system(const ActiveSet& active, double strength);
   bool model_step(ActiveSet& target);
   double steepest_curvature() const;
-  double cap(double largest) const;
+  double cap(double largest, const Direction<Model>& step) const;
   double merit(double weight) const;
   double search(const Iterate& at, const ActiveSet& target, double& weight);
 
-  System system_;
-  Contacts contacts_;
-  Direction step_, correction_;
+  System<Model> system_;
+  Contacts<Model> contacts_;
+  Direction<Model> step_, correction_;
   Iterate trial_;
   std::vector<double> penalty_;
   double damping_ = 0;

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import pytest
 
-from solver import Capsule, Circle, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene, forces
+from solver import Capsule, Circle, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene, free
 
 
 def make_circles(*circles: tuple[float, float, float]) -> Scene:
@@ -78,7 +78,7 @@ def random_shapes(generator: np.random.Generator, thinnest: float = 6) -> Scene:
     """One to four obstacles of any kind that leave the unactuated robot free."""
     while True:
         scene = Scene(random_shape(generator, thinnest) for _ in range(generator.integers(1, 5)))
-        if forces.clearance(Robot.prototype(), scene, 0.0) > 1:
+        if free.clearance(Robot.prototype(), scene, 0.0) > 1:
             return scene
 
 

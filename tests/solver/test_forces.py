@@ -6,17 +6,9 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver
-from solver.forces import (
-    Onset,
-    VirtualWork,
-    clearance,
-    fitted_slopes,
-    force_true,
-    free_nodes,
-    free_tension,
-    tip_slopes,
-)
+from solver.forces import Onset, VirtualWork, force_true
 from solver.formulation import node_derivatives
+from solver.free import tip_slopes
 
 SCENES = [
     Scene([Circle(center=(44, 104), radius=15)]),
@@ -39,7 +31,7 @@ def pulled(scene: Scene, cable_mm: float, step: float = 0.25):
 def test_force_is_stiffness_times_multiplier(scene):
     _, equilibrium, _ = pulled(scene, 9.0)
     for force, multipliers in zip(force_true(equilibrium), equilibrium.multipliers, strict=True):
-        assert np.linalg.norm(force) <= equilibrium.robot.stiffness * multipliers.sum() * (1 + 1e-12)
+        assert np.linalg.norm(force) <= equilibrium.stiffness * multipliers.sum() * (1 + 1e-12)
     assert np.linalg.norm(force_true(equilibrium).sum(axis=0)) > 0
 
 
@@ -68,35 +60,8 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(scene):
 def test_tension_is_the_slope_of_the_energy_along_the_branch(scene):
     solver, equilibrium, _ = pulled(scene, 9.1)
     ahead, behind = (solver.step(equilibrium, equilibrium.cable_mm + h) for h in (1e-4, -1e-4))
-    slope = equilibrium.robot.stiffness * (ahead.objective - behind.objective) / 2e-4
+    slope = equilibrium.stiffness * (ahead.objective - behind.objective) / 2e-4
     assert slope == pytest.approx(equilibrium.tension, rel=1e-6)
-
-
-def test_free_robot_in_closed_form():
-    solver = Solver(Robot.prototype(), Scene())
-    for cable in (0.0, 0.5, 5.0, 12.0):
-        equilibrium = solver.step(solver.rest(), cable)
-        assert free_nodes(solver.robot, cable) == pytest.approx(equilibrium.nodes, abs=1e-11)
-        assert free_tension(solver.robot, cable) == pytest.approx(equilibrium.tension, abs=1e-12)
-    h = 1e-5
-    slopes = (free_nodes(solver.robot, 5 + h)[-1] - free_nodes(solver.robot, 5 - h)[-1]) / (2 * h)
-    assert tip_slopes(solver.robot, 5.0) == pytest.approx(slopes, rel=1e-7)
-
-
-def test_fitted_slopes_lie_between_and_tend_to_the_exact_ones():
-    robot = Robot.prototype()
-    fitted, low, high = fitted_slopes(robot, 2.0, 6.0), tip_slopes(robot, 2.0), tip_slopes(robot, 6.0)
-    assert np.all((np.minimum(low, high) <= fitted) & (fitted <= np.maximum(low, high)))
-    assert fitted_slopes(robot, 3.999, 4.001) == pytest.approx(tip_slopes(robot, 4.0), rel=1e-6)
-    with pytest.raises(ValueError, match="range is 5 to 2"):
-        fitted_slopes(robot, 5, 2)
-
-
-def test_clearance_is_the_smallest_gap_of_the_free_robot():
-    for scene in SCENES:
-        rest = Solver(Robot.prototype(), scene).rest()
-        assert clearance(rest.robot, scene, 0.0) == pytest.approx(rest.gaps.min(), abs=1e-12)
-    assert clearance(Robot.prototype(), Scene(), 3.0) == math.inf
 
 
 def test_onset_does_not_depend_on_the_increment():

@@ -102,7 +102,7 @@ def test_node_problem_at_a_solution(circles, pulls):
     robot = Robot.prototype()
     scene = circles((44, 104, 15), (70, 140, 10))
     solver, problem = Solver(robot, scene), node_problem(robot, scene.kinds)
-    outputs = [problem.objective, problem.equalities, problem.gaps]
+    outputs = [problem.objective, problem.equalities, problem.inequalities]
     evaluate = ca.Function("problem", [problem.unknowns, problem.parameters], outputs)
     equilibrium = solver.rest()
     for cable in pulls(8.0, 0.5):

@@ -1,0 +1,103 @@
+"""The robot that nothing touches, in closed form: all segments have the same shape."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from solver.formulation import arc_function
+from solver.geometry import touchable_points, touching_points
+from solver.robot import Robot
+from solver.scene import Scene
+
+NEWTON_ITERATIONS = 8
+
+
+class _Segment(NamedTuple):
+    """A segment of the free robot: angle of its disks [rad], chord [mm], and their slopes in the cable displacement."""
+
+    angle: float
+    chord: float
+    turn: float
+    stretch: float
+
+
+def tip_slopes(robot: Robot, cable_mm: float) -> np.ndarray:
+    """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
+    angle, chord, turn, stretch = _segment(robot, cable_mm)
+    middles = np.arange(robot.segments) + 0.5
+    sines, cosines, turns = np.sin(middles * angle), np.cos(middles * angle), middles * turn
+    return np.array(
+        [
+            (stretch * sines + chord * turns * cosines).sum(),
+            (stretch * cosines - chord * turns * sines).sum(),
+            -robot.segments * turn,
+        ]
+    )
+
+
+def fitted_slopes(robot: Robot, low_mm: float, high_mm: float) -> np.ndarray:
+    """Slopes of straight lines fitted to the free tip pose over a range of cable displacement (Fig. 7), as above.
+
+    Raises:
+        ValueError: If the range is empty or outside the robot's.
+    """
+    if not 0 <= low_mm < high_mm <= robot.cable_limit_mm:
+        raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within 0 to {robot.cable_limit_mm:.6g} mm")
+    cables = np.linspace(low_mm, high_mm, 101)
+    tips = np.array([free_nodes(robot, cable)[-1] for cable in cables])
+    return np.asarray(np.polyfit(cables, tips, 1)[0])
+
+
+def free_angle(robot: Robot, cable_mm: float) -> float:
+    """Angle between consecutive disks [rad]."""
+    return _segment(robot, cable_mm).angle
+
+
+def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
+    """Node poses, ``(n+1, 3)`` [mm, mm, rad]."""
+    angle, chord, *_ = _segment(robot, cable_mm)
+    nodes = np.zeros((robot.segments + 1, 3))
+    middles = (np.arange(robot.segments) + 0.5) * angle
+    nodes[1:, 0] = chord * np.cumsum(np.sin(middles))
+    nodes[1:, 1] = chord * np.cumsum(np.cos(middles))
+    nodes[:, 2] = -angle * np.arange(robot.segments + 1)
+    return nodes
+
+
+def free_tension(robot: Robot, cable_mm: float) -> float:
+    """Cable tension, ``B dJ/dl`` [N]."""
+    segment = _segment(robot, cable_mm)
+    return 2 * robot.stiffness * robot.segments * segment.angle * segment.turn
+
+
+def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
+    """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact."""
+    points = touching_points(robot, free_nodes(robot, cable_mm))
+    touchable = touchable_points(robot, scene)
+    gaps = [obstacle.gap(points)[touched].min() for obstacle, touched in zip(scene, touchable, strict=True)]
+    return float(min(gaps, default=np.inf))
+
+
+def _segment(robot: Robot, cable_mm: float) -> _Segment:
+    pull, length, offset = cable_mm / robot.segments, robot.segment_mm, robot.offset_mm
+    if robot.cable == "uniform":  # its shear vanishes
+        turn = 1 / np.sqrt((robot.segments * offset) ** 2 - cable_mm**2 / 4)
+        return _Segment(float(2 * np.arcsin(pull / (2 * offset))), length, float(turn), 0.0)
+    angle = pull / offset
+    for _ in range(NEWTON_ITERATIONS):
+        *_, taken, slope, _ = _arc(angle, length, offset)
+        angle -= (taken - pull) / slope
+    _, _, stretch, *_, slope, _ = _arc(angle, length, offset)
+    chord, turn = length * np.sinc(angle / (2 * np.pi)), 1 / (robot.segments * slope)
+    return _Segment(float(angle), float(chord), float(turn), float(stretch * chord * turn))
+
+
+@lru_cache(maxsize=1)
+def _arc_function() -> ca.Function:
+    return arc_function()
+
+
+def _arc(angle: float, length: float, offset: float) -> np.ndarray:
+    return np.asarray(_arc_function()(angle, length, offset)).ravel()
