@@ -21,7 +21,7 @@ bench: $(INSTALL)
 	$(BIN)/python benchmarks/kernel.py
 
 soak: $(INSTALL)
-	$(BIN)/python -m pytest tests/solver/test_soak.py --soak 334000
+	$(BIN)/python -m pytest tests/solver/test_soak.py --soak 167000
 
 $(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/*) solver/formulation.py solver/codegen.py
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)

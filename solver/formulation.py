@@ -312,9 +312,9 @@ def moved_shape(kind: str, shape: ca.MX, motion: ca.MX) -> ca.MX:
 def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
     """Derivatives of the optimality conditions of :func:`node_problem`.
 
-    With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian ``L = J − ν·equalities − λ·inequalities``,
-    its conditions ``F = (L_z, equalities, inequalities)`` and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``.
-    The slope of the loads in the multipliers stands in ``F_v`` already.
+    With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian
+    ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities, inequalities)`` and loads ``L_v``:
+    ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the multipliers stands in ``F_v`` already.
     """
     problem = node_problem(robot, kinds)
     change = ca.MX.sym("change", 2 + 4 * len(kinds))

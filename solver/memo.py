@@ -37,12 +37,13 @@ class TransitionMemo:
         self._capacity = capacity
         self.clear()
 
-    def step(self, equilibrium: Equilibrium, cable_mm: float) -> Equilibrium:
+    def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
         """The solver's ``step``, bit for bit.
 
         Args:
             equilibrium: Where the robot is.
             cable_mm: Commanded cable displacement [mm].
+            length_mm: Commanded length of the backbone [mm]; ``None`` keeps it.
 
         Returns:
             The equilibrium reached, the same object while the step is remembered.
@@ -52,14 +53,14 @@ class TransitionMemo:
         """
         robot, scene = equilibrium.robot, equilibrium.scene
         if (robot is not self.robot and robot != self.robot) or (scene is not self.scene and scene != self.scene):
-            return self._step(equilibrium, cable_mm)
-        key = equilibrium.block.tobytes(), cable_mm
+            return self._step(equilibrium, cable_mm, length_mm)
+        key = equilibrium.block.tobytes(), cable_mm, length_mm
         reached = self._reached.get(key)
         if reached is not None:
             self._reached.move_to_end(key)
             self._hits += 1
             return reached
-        reached = self._reached[key] = self._step(equilibrium, cable_mm)
+        reached = self._reached[key] = self._step(equilibrium, cable_mm, length_mm)
         self._misses += 1
         if len(self._reached) > self._capacity:
             self._reached.popitem(last=False)
@@ -67,7 +68,7 @@ class TransitionMemo:
 
     def clear(self) -> None:
         """Forget all steps and start the statistics anew."""
-        self._reached: OrderedDict[tuple[bytes, float], Equilibrium] = OrderedDict()
+        self._reached: OrderedDict[tuple[bytes, float, float | None], Equilibrium] = OrderedDict()
         self._hits = self._misses = 0
 
     @property

@@ -21,6 +21,7 @@ from solver.status import Status
 LARGEST_STEP, SMALLEST_STEP = 0.25, 0.03  # cable, or half the insertion, of one solve, and of its last try [mm]
 PRETENSION = 0.05  # a touching robot is not slackened below it [mm]
 SLACK = 1e-3  # below it a shear costs too little for IPOPT, and the robot is taken as free [mm]
+TURN = 0.02  # unit of the angles of a robot with a sliding cable [rad]
 RESOLUTION = 1e-6  # to which the command at the tension limit is found [mm]
 MOVE_OFFSET, MOVE_SLOPE = 0.5, 16.0  # a node that moves farther than offset + slope·|step| has left the branch [mm]
 
@@ -139,12 +140,13 @@ class ReferenceSolver:
         n = self.robot.segments
         problem = node_problem(self.robot, self.scene.kinds)
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
-        # In units of the free robot's segment angle, so that the tolerances mean the same at every displacement.
-        free_angle = 1.0 if self._sliding else problem.parameters[0] / (n * problem.parameters[2])
+        # In units of the free robot's segment angle, so that the tolerances mean the same at every displacement;
+        # with a sliding cable a robot bends without any, too.
+        unit = TURN if self._sliding else problem.parameters[0] / (n * problem.parameters[2])
         nlp: dict[str, Any] = {
             "x": problem.unknowns,
             "p": problem.parameters,
-            "f": problem.objective / free_angle**2,
+            "f": problem.objective / unit**2,
             "g": constraints,
         }
         self._ipopt = ca.nlpsol("reference", "ipopt", nlp, OPTIONS)
@@ -160,7 +162,7 @@ class ReferenceSolver:
         return [cable, length, self.robot.offset_mm, *self._shapes]
 
     def _scale(self, cable: float) -> float:
-        return 1.0 if self._sliding else (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
+        return TURN**2 if self._sliding else (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
 
     def _goal(self, point: _Point, cable: float) -> float:
         touching = not self._sliding and bool(self._pushes(point).any())

@@ -205,6 +205,29 @@ bool Branch<Model>::finish() {
   return true;
 }
 
+// One iterate of the descent from `present_` to `trial_`, so short that nothing is jumped over. True at an equilibrium.
+template <class Model>
+bool Branch<Model>::descend(bool& moved) {
+  double cap = kDescentCap;
+  for (int shortening = 0; shortening < kDescentShortenings; ++shortening, cap /= 4) {
+    trial_ = present_;
+    ++iterations;
+    if (newton_.descend(trial_, cap, moved).converged) return true;
+    if (!moved || passable(kDescentMove)) return false;
+  }
+  moved = false;
+  return false;
+}
+
+// Leaves in `trial_` the feasible shape closest to `present_` under a command, with the active gaps held closed or not.
+template <class Model>
+bool Branch<Model>::depart(const Command& command, bool holding) {
+  trial_ = present_;
+  trial_.command = command;
+  if (!holding) trial_.active.count = 0;
+  return newton_.restore(trial_) && passable(kDescentMove);
+}
+
 // The branch ends within the smallest step: descend from its end, feasible and slowly, to where the robot goes.
 template <class Model>
 Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
@@ -222,17 +245,12 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     return reason;
   };
 
-  trial_ = present_;
-  trial_.command = command;
-  bool moved = newton_.measure(present_) && newton_.restore(trial_);
-  for (int i = 0; i < kDescentIterations && moved && passable(kDescentMove); ++i) {
+  bool moved = newton_.measure(present_) && (depart(command, true) || depart(command, false));
+  for (int i = 0; i < kDescentIterations && moved; ++i) {
     std::swap(present_, trial_);
     remember();
-    if (i % kFinishEvery != kFinishEvery - 1 || !finish()) {
-      trial_ = present_;
-      ++iterations;
-      if (!newton_.descend(trial_, moved).converged) continue;
-    }
+    const bool finished = i % kFinishEvery == kFinishEvery - 1 && finish();
+    if (!finished && !descend(moved)) continue;
     settled_ = false;
     settle();
     if (holding && tension_ > newton_.chain.robot().max_tension) return undo(End::kOverTension);

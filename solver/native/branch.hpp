@@ -51,6 +51,8 @@ class Branch : public Follower {
   bool releases(const Command& command) const;
   End pass_end(const Command& command);
   bool finish();
+  bool depart(const Command& command, bool holding);
+  bool descend(bool& moved);
   bool passable(double allowed) const;
   void accept();
   void remember();

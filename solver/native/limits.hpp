@@ -65,5 +65,6 @@ inline constexpr double kEnergyRoundoff = 1e-15;
 inline constexpr int kDescentBacktracks = 12;
 inline constexpr int kRestorations = 8;
 inline constexpr double kDescentMove = 4.0;    // largest node motion of one iterate
+inline constexpr int kDescentShortenings = 4;  // of an iterate that moved farther, or through an obstacle
 
 }  // namespace ccr::limits

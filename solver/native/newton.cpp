@@ -224,7 +224,7 @@ bool Newton<Model>::on_surface(const ActiveSet& active, double tolerance) const 
 }
 
 template <class Model>
-Verdict Newton<Model>::descend(Iterate& at, bool& moved) {
+Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   Verdict verdict;
   moved = false;
   if (!chain.evaluate(at.controls, at.command)) return verdict;
@@ -234,7 +234,7 @@ Verdict Newton<Model>::descend(Iterate& at, bool& moved) {
   ActiveSet target = at.active;
   if (!model_step(target)) return verdict;
   const double before = chain.objective();
-  double scale = cap(kDescentCap, step_);
+  double scale = cap(largest, step_);
   trial_.command = at.command;
   const ActiveSet touching = closed(target);
   // Restorations are measured by closeness: near a fold the energy hardly resists the motion that ends the branch.

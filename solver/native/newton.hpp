@@ -29,8 +29,9 @@ class Newton {
   Verdict solve(Iterate& at);
 
   // One iterate of energy descent from a feasible shape. Returns the verdict on that shape, and where it is not yet an
-  // equilibrium moves `at` to a feasible one of no more energy; `moved` tells whether it could.
-  Verdict descend(Iterate& at, bool& moved);
+  // equilibrium moves `at` to a feasible one of no more energy, by a step of at most the size `largest`; `moved` tells
+  // whether it could.
+  Verdict descend(Iterate& at, double largest, bool& moved);
 
   // Takes the curvature at `at` as the measure of motion for restore; false when it cannot be made positive.
   bool measure(const Iterate& at);

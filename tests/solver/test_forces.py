@@ -1,6 +1,7 @@
 """Forces against the virtual work they stand for, and against the paper's Table 1."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from solver import Circle, HalfPlane, Robot, Scene, Solver
 from solver.forces import Onset, VirtualWork, force_true
 from solver.formulation import node_derivatives
 from solver.free import tip_slopes
+from solver.robot import CABLES
 
 SCENES = [
     Scene([Circle(center=(44, 104), radius=15)]),
@@ -16,10 +18,11 @@ SCENES = [
     Scene([HalfPlane(point=(31, 127), normal=(-1, 0), nodes=(14,))]),
 ]
 EVERY_SCENE = pytest.mark.parametrize("scene", SCENES)
+EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
 
 
-def pulled(scene: Scene, cable_mm: float, step: float = 0.25):
-    solver = Solver(Robot.prototype(max_tension=math.inf), scene)
+def pulled(scene: Scene, cable_mm: float, step: float = 0.25, cable: str = "uniform"):
+    solver = Solver(replace(Robot.prototype(max_tension=math.inf), cable=cable), scene)
     before, now, onset = solver.rest(), solver.rest(), Onset()
     while now.cable_mm < cable_mm - 1e-9:
         before, now = now, solver.step(now, min(now.cable_mm + step, cable_mm))
@@ -35,30 +38,33 @@ def test_force_is_stiffness_times_multiplier(scene):
     assert np.linalg.norm(force_true(equilibrium).sum(axis=0)) > 0
 
 
+@EVERY_CABLE
 @EVERY_SCENE
-def test_work_of_tension_and_contact_is_the_change_of_energy(scene):
+def test_work_of_tension_and_contact_is_the_change_of_energy(cable, scene):
     """B(∂J/∂q·q' + ∂J/∂l) = T + Σ F_j·x_j' for any admissible direction (q', 1), in node coordinates."""
-    _, equilibrium, _ = pulled(scene, 9.0)
+    _, equilibrium, _ = pulled(scene, 9.0, cable=cable)
     robot, n = equilibrium.robot, equilibrium.robot.segments
-    parameters = [equilibrium.cable_mm, robot.length_mm, robot.offset_mm]
-    parameters += [value for obstacle in scene for value in obstacle.parameters]
-    unknowns = np.concatenate([equilibrium.nodes[1:, :2].ravel(), equilibrium.cable_nodes[1:].ravel()])
-    slope, _, equalities, _, gaps = (v.full() for v in node_derivatives(robot, scene.kinds)(unknowns, parameters))
-    # Admissible: backbone and disks keep their lengths, cable segments shorten by 1/n each.
+    unknowns, parameters, _, _ = equilibrium.node_solution()
+    slope, _, held, _, gaps = (v.full() for v in node_derivatives(robot, scene.kinds)(unknowns, parameters))
+    # Admissible: backbone and disks keep their lengths; the cable shortens, by 1/n in each segment or as a whole.
     shortening = np.zeros(3 * n)
-    shortening[n : 2 * n] = -1.0 / n
-    null = np.linalg.svd(equalities)[2][3 * n :]
+    if cable == "sliding":
+        held, gaps, shortening = np.vstack([held, gaps[:1]]), gaps[1:], np.r_[shortening, 1.0]
+    else:
+        shortening[n : 2 * n] = -1.0 / n
+    null = np.linalg.svd(held)[2][len(held) :]
     generator = np.random.default_rng(0)
     for _ in range(10):
-        direction = np.linalg.lstsq(equalities, shortening, rcond=None)[0] + generator.normal(size=n) @ null
-        work = robot.stiffness * float(equilibrium.multipliers[:, :, 1:].ravel() @ (gaps @ direction))
-        change = robot.stiffness * float(slope.ravel() @ direction)
+        direction = np.linalg.lstsq(held, shortening, rcond=None)[0] + generator.normal(size=len(null)) @ null
+        work = equilibrium.stiffness * float(equilibrium.multipliers[:, :, 1:].ravel() @ (gaps @ direction))
+        change = equilibrium.stiffness * float(slope.ravel() @ direction)
         assert change == pytest.approx(equilibrium.tension + work, abs=1e-8)
 
 
+@EVERY_CABLE
 @EVERY_SCENE
-def test_tension_is_the_slope_of_the_energy_along_the_branch(scene):
-    solver, equilibrium, _ = pulled(scene, 9.1)
+def test_tension_is_the_slope_of_the_energy_along_the_branch(cable, scene):
+    solver, equilibrium, _ = pulled(scene, 9.1, cable=cable)
     ahead, behind = (solver.step(equilibrium, equilibrium.cable_mm + h) for h in (1e-4, -1e-4))
     slope = equilibrium.stiffness * (ahead.objective - behind.objective) / 2e-4
     assert slope == pytest.approx(equilibrium.tension, rel=1e-6)

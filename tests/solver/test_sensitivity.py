@@ -7,10 +7,14 @@ import pytest
 
 from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver
 from solver.forces import force_true
-from solver.robot import LINES
+from solver.robot import CABLES, LINES
 from solver.sensitivity import CABLE, LENGTH, obstacle_rows, sensitivity
 
-ROBOT = Robot(length_mm=180, segments=18, offset_mm=8, touch=LINES, between=1, max_tension=100)
+ROBOT = Robot(
+    length_mm=180, segments=18, offset_mm=8, touch=LINES, between=1, max_tension=100, length_range_mm=(170, 190)
+)
+ROBOTS = [replace(ROBOT, cable=cable) for cable in CABLES]
+EVERY_ROBOT = pytest.mark.parametrize("robot", ROBOTS, ids=CABLES)
 PUSHED = [
     Circle(center=(44, 104), radius=15),
     Ellipse(center=(44, 104), radii=(15, 9), axis=(1, 2)),
@@ -26,10 +30,10 @@ EVERY_SCENE = pytest.mark.parametrize("obstacles", SCENES, ids=lambda scene: "+"
 CABLE_MM, STEP = 9.0, 1e-4
 
 
-def solve(obstacles, cable=CABLE_MM, length=180.0):
-    """The equilibrium of a freshly pulled robot."""
-    solver = Solver(replace(ROBOT, length_mm=length), Scene(obstacles))
-    equilibrium = solver.rest()
+def solve(robot, obstacles, cable=CABLE_MM, length=180.0):
+    """The equilibrium of a freshly inserted and pulled robot."""
+    solver = Solver(robot, Scene(obstacles))
+    equilibrium = solver.step(solver.rest(), 0.0, length)
     for part in np.linspace(0, cable, 31)[1:]:
         equilibrium = solver.step(equilibrium, part)
     return equilibrium
@@ -74,30 +78,33 @@ def compare(slopes, row, ahead, behind):
     assert predicted(slopes, row) == pytest.approx(difference, rel=1e-5, abs=1e-9 + 1e-5 * np.abs(difference).max())
 
 
+@EVERY_ROBOT
 @EVERY_SCENE
-def test_cable_and_length(obstacles):
-    equilibrium = solve(obstacles)
+def test_cable_and_length(robot, obstacles):
+    equilibrium = solve(robot, obstacles)
     assert equilibrium.contact.any()
     slopes = sensitivity(equilibrium)
-    compare(slopes, CABLE, solve(obstacles, CABLE_MM + STEP), solve(obstacles, CABLE_MM - STEP))
-    compare(slopes, LENGTH, solve(obstacles, length=180 + STEP), solve(obstacles, length=180 - STEP))
+    compare(slopes, CABLE, solve(robot, obstacles, CABLE_MM + STEP), solve(robot, obstacles, CABLE_MM - STEP))
+    compare(slopes, LENGTH, *(solve(robot, obstacles, length=length) for length in (180 + STEP, 180 - STEP)))
 
 
+@EVERY_ROBOT
 @EVERY_SCENE
 @pytest.mark.parametrize("motion", range(4), ids=["x", "y", "turn", "growth"])
-def test_obstacles(obstacles, motion):
-    slopes = sensitivity(solve(obstacles))
+def test_obstacles(robot, obstacles, motion):
+    slopes = sensitivity(solve(robot, obstacles))
     for j in range(len(obstacles)):
         both = []
         for change in (STEP, -STEP):
             arguments = [0.0] * 4
             arguments[motion] = change
-            both.append(solve([moved(o, *arguments) if k == j else o for k, o in enumerate(obstacles)]))
+            both.append(solve(robot, [moved(o, *arguments) if k == j else o for k, o in enumerate(obstacles)]))
         compare(slopes, obstacle_rows(j).start + motion, *both)
 
 
-def test_free_robot():
-    solver = Solver(ROBOT, Scene())
+@EVERY_ROBOT
+def test_free_robot(robot):
+    solver = Solver(robot, Scene())
     ahead, here, behind = (solver.step(solver.rest(), cable) for cable in (5 + STEP, 5.0, 5 - STEP))
     compare(sensitivity(here), CABLE, ahead, behind)
 

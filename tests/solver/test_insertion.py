@@ -1,0 +1,102 @@
+"""Insertion, and the sliding cable: what a robot meets ahead, slack, and what stops it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
+from solver.robot import CABLES
+
+LENGTHS = {"length_mm": 120, "length_range_mm": (60, 200)}
+EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+
+
+def robot_with(cable, **changes):
+    return replace(Robot.prototype(), **LENGTHS, cable=cable, **changes)
+
+
+def inserted(solver, *commands):
+    equilibrium = solver.rest()
+    for cable, length in commands:
+        equilibrium = solver.step(equilibrium, cable, length)
+    return equilibrium
+
+
+@EVERY_CABLE
+def test_free_robot_grows_and_shrinks(cable):
+    solver = Solver(robot_with(cable), Scene())
+    long, short = inserted(solver, (6.0, 180)), inserted(solver, (6.0, 180), (6.0, 90))
+    assert long.length_mm == 180
+    assert short.length_mm == 90
+    assert short.stiffness == pytest.approx(2 * long.stiffness)
+    assert np.array_equal(solver.step(short, 0.0, 120).block, solver.rest().block)
+
+
+@EVERY_CABLE
+def test_inserted_past_a_circle(cable):
+    solver = Solver(robot_with(cable), Scene([Circle(center=(40, 120), radius=10)]))
+    states = [solver.step(solver.rest(), 6.0, 120)]
+    for length in range(122, 190, 2):
+        states.append(solver.step(states[-1], 6.0, length))
+    assert all(state.status in (Status.CONVERGED, Status.SNAPPED) for state in states)
+    assert any(state.contact.any() for state in states)
+    for state in states:
+        assert max(state.residuals()) < 1e-8
+
+
+def test_cable_goes_slack_where_the_wall_bends_the_robot_more():
+    """A wall ahead that leans to the cable's side shortens the cable's way by itself."""
+    wall = HalfPlane(point=(0, 150), normal=(0.3, -1))
+    solver = Solver(robot_with("sliding"), Scene([wall]))
+    slack = inserted(solver, (0.0, 148), (0.0, 180))
+    assert slack.status is Status.CONVERGED
+    assert slack.tension == 0
+    assert slack.slack_mm > 1
+    tip = slack.nodes[-1, :2]
+    assert wall.gap(tip) == pytest.approx(0, abs=1e-9)
+    assert solver.step(slack, slack.slack_mm - 0.01).tension == 0
+    assert solver.step(slack, slack.slack_mm + 0.01).tension > 0
+
+
+def test_cable_holds_where_the_wall_bends_the_robot_the_other_way():
+    solver = Solver(robot_with("sliding", max_tension=3.0), Scene([HalfPlane(point=(0, 150), normal=(-0.3, -1))]))
+    held = inserted(solver, (0.0, 148), (0.0, 180))
+    assert held.status is Status.STALLED
+    assert held.tension == pytest.approx(3.0, rel=1e-6)
+    assert held.tension <= 3.0
+    assert 148 < held.length_mm < 180
+    assert solver.step(held, 0.0, 148).status is Status.CONVERGED
+
+
+@EVERY_CABLE
+def test_straight_robot_jams_head_on(cable):
+    """Nothing tells it which way to give."""
+    solver = Solver(robot_with(cable), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
+    jammed = inserted(solver, (0.0, 155))
+    assert jammed.status is Status.JAMMED
+    assert jammed.length_mm == pytest.approx(150, abs=1e-3)
+    assert np.array_equal(solver.step(jammed, 0.0, 120).block, solver.rest().block)
+
+
+def test_buckled_robot_is_pulled_back_straight():
+    solver = Solver(robot_with("sliding"), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
+    buckled = inserted(solver, (3.0, 120), (3.0, 180), (0.0, 180))
+    assert buckled.nodes[-1, 0] > 50
+    assert np.array_equal(solver.step(buckled, 0.0, 120).block, solver.rest().block)
+
+
+def test_length_out_of_range_is_refused():
+    solver = Solver(robot_with("uniform"), Scene())
+    for length in (59.9, 200.1, np.nan):
+        with pytest.raises(ValueError, match=r"length_mm is .*; it must be from 60 to 200"):
+            solver.step(solver.rest(), 1.0, length)
+    fixed = Solver(Robot.prototype(), Scene())
+    with pytest.raises(ValueError, match="it must be from 180 to 180"):
+        fixed.step(fixed.rest(), 1.0, 181)
+
+
+def test_long_insertion_is_not_taken_for_a_jam():
+    robot = Robot(length_mm=100, segments=18, offset_mm=8, length_range_mm=(100, 2000))
+    solver = Solver(robot, Scene())
+    assert solver.step(solver.rest(), 5.0, 2000).status is Status.CONVERGED
