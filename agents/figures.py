@@ -60,7 +60,7 @@ def draw_force(axis: Axes, episode: Episode) -> None:
 def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
     """Backbone, cable, disks, obstacles and contacts."""
     nodes, cable = equilibrium.nodes, equilibrium.cable_nodes
-    for obstacle in equilibrium.scene:
+    for obstacle in equilibrium.scene_now:
         if not isinstance(obstacle, HalfPlane):
             axis.fill(*obstacle.outline().T, facecolor=OBSTACLE, edgecolor="0.4")
         else:

@@ -91,6 +91,7 @@ def reference_times(steps: list[Timed]) -> tuple[np.ndarray, np.ndarray]:
 
 
 PUSHED = Circle(center=(44, 104), radius=15)  # of the paper's Fig. 4a
+SPRUNG = Circle(center=(44, 104), radius=15, stiffness=1.0)
 PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25)])
 
 
@@ -103,13 +104,15 @@ def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
     }
 
 
-def far_ratio(repeats: int = 40) -> float:
-    """Time of a path with ten far obstacles over that without them, each the median of runs side by side."""
-    far = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(10)]
-    alone, crowded = (Solver(Robot.prototype(), Scene([PUSHED, *others])) for others in ([], far))
-    times = np.array([(path_times(alone), path_times(crowded)) for _ in range(repeats)])
-    mean_alone, mean_crowded = np.median(times, axis=0).mean(axis=1)
-    return float(mean_crowded / mean_alone)
+FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(10)]
+
+
+def cost(obstacles: list[Circle], repeats: int = 40) -> float:
+    """Time of a path among obstacles over that with one, each the median of runs side by side."""
+    plain, other = (Solver(Robot.prototype(), Scene(scene)) for scene in ([PUSHED], obstacles))
+    times = np.array([(path_times(plain), path_times(other)) for _ in range(repeats)])
+    mean_plain, mean_other = np.median(times, axis=0).mean(axis=1)
+    return float(mean_other / mean_plain)
 
 
 def cold_ratio(repeats: int = 40) -> float:
@@ -175,8 +178,11 @@ def main() -> None:
     exponent = float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0])
     print("segments: " + ", ".join(f"{n}: {mean:.1f} µs" for n, mean in means.items()) + f"; growth n^{exponent:.2f}")
 
-    far, cold, memo = far_ratio(), cold_ratio(), memo_ratio()
-    print(f"ten far obstacles cost {far:.2f} times the step; a cold solve of the end of the path {cold:.0f} warm steps")
+    far, spring, cold, memo = cost([PUSHED, *FAR]), cost([SPRUNG]), cold_ratio(), memo_ratio()
+    print(
+        f"a step costs {far:.2f} times as much with ten far obstacles, {spring:.2f} times with the obstacle on a spring"
+    )
+    print(f"a cold solve of the end of the path costs {cold:.0f} warm steps")
     print(f"a warm step takes {memo:.1f} times as long as its replay from the memo")
 
     if arguments.json:
@@ -193,6 +199,7 @@ def main() -> None:
             "segments_mean_us": means,
             "growth_exponent": exponent,
             "far_ratio": far,
+            "spring_ratio": spring,
             "cold_ratio": cold,
             "memo_ratio": memo,
         }

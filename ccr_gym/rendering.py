@@ -294,7 +294,7 @@ def draw_world(canvas: Canvas, frame: Frame) -> None:
     """Everything left of the gauge and above the footer."""
     equilibrium = frame.equilibrium
     draw_grid(canvas)
-    for obstacle in equilibrium.scene:
+    for obstacle in equilibrium.scene_now:
         if isinstance(obstacle, Circle):
             draw_circle(canvas, obstacle)
         elif not isinstance(obstacle, HalfPlane):

@@ -78,6 +78,13 @@ class Equilibrium:
         return float(self.block[3])
 
     @property
+    def energy(self) -> float:
+        """Elastic energy of the robot and of the springs that obstacles are mounted on [N·mm]."""
+        springs = [obstacle.stiffness_matrix for obstacle in self.scene]
+        moved = zip(self.displacements, springs, strict=True)
+        return self.stiffness * self.objective + sum(float(d @ spring @ d) / 2 for d, spring in moved)
+
+    @property
     def stiffness(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective J into energy."""
         return self.robot.rigidity * self.robot.segments / (2 * self.length_mm)
@@ -126,6 +133,17 @@ class Equilibrium:
         return self.block[start + which * size : start + (which + 1) * size].reshape(shape)
 
     @property
+    def displacements(self) -> np.ndarray:
+        """How far each obstacle has been pushed from its place, zero for a fixed one, ``(m, 2)`` [mm]."""
+        return self.block[self.block.size - 2 * len(self.scene) :].reshape(-1, 2)
+
+    @property
+    def scene_now(self) -> Scene:
+        """The obstacles where they have been pushed to."""
+        moved = zip(self.scene, self.displacements, strict=True)
+        return Scene(obstacle.shifted(shift) for obstacle, shift in moved) if any(self.scene.mounted) else self.scene
+
+    @property
     def contact(self) -> np.ndarray:
         """Which points touch which obstacle: a positive multiplier, ``(m, p, k)`` bool."""
         return self.multipliers > 0
@@ -146,12 +164,13 @@ class Equilibrium:
         return np.r_[self.tension / self.stiffness, multipliers] if self.robot.cable == "sliding" else multipliers
 
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
-        shapes = [value for obstacle in self.scene for value in obstacle.parameters]
-        parameters = np.array([self.cable_mm, self.length_mm, self.robot.offset_mm, *shapes])
-        return np.concatenate([self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel()]), parameters
+        robot, mounts = self.robot, self.displacements[list(self.scene.mounted)]
+        parameters = [self.cable_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
+        unknowns = [self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel(), mounts.ravel()]
+        return np.concatenate(unknowns), np.array(parameters)
 
     def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
-        derivatives = node_derivatives(self.robot, self.scene.kinds)(unknowns, parameters)
+        derivatives = node_derivatives(self.robot, self.scene.kinds, self.scene.mounted)(unknowns, parameters)
         return [value.full() for value in derivatives]
 
     def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -116,7 +116,8 @@ def _contacts(equilibrium: Equilibrium) -> list[tuple[int, float, np.ndarray]]:
     if not found[0].size:
         return []
     points, obstacles = equilibrium.points, equilibrium.scene.obstacles
+    displacements = equilibrium.displacements
     return [
-        (j, float(multipliers[j, line, position]), obstacles[j].normal_at(points[line, position]))
+        (j, float(multipliers[j, line, position]), obstacles[j].normal_at(points[line, position] - displacements[j]))
         for j, line, position in zip(*(index.tolist() for index in found), strict=True)
     ]

@@ -11,12 +11,12 @@ Three layers, all in millimetre and radian:
 The first two are turned into C when the package is built (:mod:`solver.codegen`), with their derivatives.
 """
 
+import itertools
 from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import casadi as ca
-import numpy as np
 
 if TYPE_CHECKING:  # the build runs this file alone
     from solver.robot import Robot
@@ -202,9 +202,11 @@ class NodeProblem(NamedTuple):
     """Eq. 5 in node coordinates, symbolic.
 
     Attributes:
-        unknowns: Backbone then cable points of nodes 1…n, each as x, y pairs, ``(4n,)`` [mm].
-        parameters: ``(l, L0, a)`` then the shapes of the obstacles, one after the other.
-        objective: Sum of squared disk angles [rad²].
+        unknowns: Backbone then cable points of nodes 1…n, then the displacements of the obstacles on springs, each as
+            x, y pairs, ``(4n + 2s,)`` [mm].
+        parameters: ``(l, L0, a, EI)``, the shapes of the obstacles, one after the other, and ``(kxx, kxy, kyy)`` of
+            those on springs.
+        objective: Sum of squared disk angles, and the energy of the springs over ``B = EI / 2 l0`` [rad²].
         equalities: Zero when every segment has its shape, ``(3n,)`` [mm]. With a uniform cable: lengths of backbone,
             cable and disk minus their values. With a sliding one, whose segments are arcs: length of the chord minus
             its value, component of the chord along the bisector of the disks, length of the disk minus its value.
@@ -219,19 +221,25 @@ class NodeProblem(NamedTuple):
     inequalities: ca.MX
 
 
-def node_problem(robot: "Robot", kinds: tuple[str, ...]) -> NodeProblem:
+def node_problem(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool, ...]) -> NodeProblem:
     """Build eq. 5 (eq. 4 when ``kinds`` is empty) for a robot's segments and points, and the given kinds of obstacle.
 
     The arccosine of eq. 4 is written as an arctangent of the same disk directions, which is smooth at zero.
+
+    Args:
+        robot: The robot.
+        kinds: Names of the gap laws of the obstacles.
+        mounted: Which obstacles are on springs.
     """
     segments = robot.segments
-    unknowns = ca.MX.sym("unknowns", 4 * segments)
-    sizes = [3, *(GAP_LAWS[kind].size for kind in kinds)]
-    parameters = ca.MX.sym("parameters", sum(sizes))
-    shapes = ca.vertsplit(parameters, np.cumsum([0, *sizes]).tolist())[1:]
+    unknowns = ca.MX.sym("unknowns", 4 * segments + 2 * sum(mounted))
+    starts = parameter_starts(kinds)
+    parameters = ca.MX.sym("parameters", starts[-1] + 3 * sum(mounted))
+    shapes = [parameters[start:end] for start, end in itertools.pairwise(starts)]
     pull, total, offset = parameters[0], parameters[1], parameters[2]
+    stiffness = parameters[3] * segments / (2 * total)
     backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(unknowns[: 2 * segments], 2, segments))
-    cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments :], 2, segments))
+    cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments : 4 * segments], 2, segments))
     disk = cable - backbone
     before, after = disk[:, :-1], disk[:, 1:]
     turned = before[0, :] * after[1, :] - before[1, :] * after[0, :]
@@ -247,12 +255,24 @@ def node_problem(robot: "Robot", kinds: tuple[str, ...]) -> NodeProblem:
         equalities = ca.horzcat(chords - total / segments, cables - share, _norms(after) - offset)
         slack = ca.MX(0, 1)
     lines = {"backbone": backbone, "cable": cable, "rim": 2 * backbone - cable}
-    gaps = [
-        _gaps(kind, _divided(lines[line], robot.between)[:, 1:], shape)
-        for kind, shape in zip(kinds, shapes, strict=True)
-        for line in robot.touch
-    ]
-    return NodeProblem(unknowns, parameters, ca.sumsqr(angle), equalities.T, ca.vertcat(slack, *gaps))
+    displacements = ca.reshape(unknowns[4 * segments :], 2, -1)
+    springs = ca.reshape(parameters[starts[-1] :], 3, -1)
+    gaps, energy = [], ca.sumsqr(angle)
+    for j, (kind, shape) in enumerate(zip(kinds, shapes, strict=True)):
+        moved = ca.MX.zeros(2)
+        if mounted[j]:
+            mount = sum(mounted[:j])
+            moved, (xx, xy, yy) = displacements[:, mount], ca.vertsplit(springs[:, mount])
+            energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * stiffness)
+        for line in robot.touch:
+            points = _divided(lines[line], robot.between)[:, 1:]
+            gaps.append(_gaps(kind, points - ca.repmat(moved, 1, points.shape[1]), shape))
+    return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(slack, *gaps))
+
+
+def parameter_starts(kinds: tuple[str, ...]) -> list[int]:
+    """Where each obstacle's shape starts in the parameters of :func:`node_problem`, and where the last one ends."""
+    return list(itertools.accumulate((GAP_LAWS[kind].size for kind in kinds), initial=4))
 
 
 def _norms(columns: ca.MX) -> ca.MX:
@@ -271,9 +291,9 @@ def _gaps(kind: str, points: ca.MX, shape: ca.MX) -> ca.MX:
 
 
 @lru_cache(maxsize=32)
-def node_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
+def node_derivatives(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of :func:`node_problem`."""
-    problem = node_problem(robot, kinds)
+    problem = node_problem(robot, kinds, mounted)
     outputs = [
         ca.gradient(problem.objective, problem.unknowns),
         problem.equalities,
@@ -309,21 +329,21 @@ def moved_shape(kind: str, shape: ca.MX, motion: ca.MX) -> ca.MX:
 
 
 @lru_cache(maxsize=32)
-def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...]) -> ca.Function:
+def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Derivatives of the optimality conditions of :func:`node_problem`.
 
     With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian
     ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities, inequalities)`` and loads ``L_v``:
     ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the multipliers stands in ``F_v`` already.
     """
-    problem = node_problem(robot, kinds)
+    problem = node_problem(robot, kinds, mounted)
     change = ca.MX.sym("change", 2 + 4 * len(kinds))
-    sizes = np.cumsum([3, *(GAP_LAWS[kind].size for kind in kinds)]).tolist()
+    starts, parameters = parameter_starts(kinds), problem.parameters
     shapes = [
-        moved_shape(kind, problem.parameters[start:end], change[2 + 4 * j : 6 + 4 * j])
-        for j, (kind, start, end) in enumerate(zip(kinds, sizes[:-1], sizes[1:], strict=True))
+        moved_shape(kind, parameters[start:end], change[2 + 4 * j : 6 + 4 * j])
+        for j, (kind, (start, end)) in enumerate(zip(kinds, itertools.pairwise(starts), strict=True))
     ]
-    changed = ca.vertcat(problem.parameters[:2] + change[:2], problem.parameters[2], *shapes)
+    changed = ca.vertcat(parameters[:2] + change[:2], parameters[2:4], *shapes, parameters[starts[-1] :])
     terms = ca.Function("terms", [problem.unknowns, problem.parameters], problem[2:])
     objective, equalities, inequalities = terms(problem.unknowns, changed)
     tensions, pushes = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("pushes", inequalities.shape[0])

@@ -3,8 +3,8 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from solver.formulation import GAP_LAWS, POLYGON_CORNERS
 from solver.robot import require_positive
 
 Pair = tuple[float, float]
+Matrix = tuple[Pair, Pair]
 
 SHAPES = {kind: index for index, kind in enumerate(GAP_LAWS)}  # as ccr::Shape in native/obstacle.hpp
 
@@ -35,25 +36,35 @@ class Extent(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle(ABC):
-    """A fixed, convex obstacle.
+    """A convex obstacle, fixed or on a spring.
 
     Attributes:
         nodes: Node indices (base = 0) that can touch it; ``None`` for all.
+        stiffness: Of the spring it is mounted on, which lets it shift but not turn [N/mm]: one number, or a symmetric
+            matrix ``((kxx, kxy), (kxy, kyy))``, kept as that. ``None`` for a fixed obstacle.
 
     Raises:
-        ValueError: If a node index is negative or repeated.
+        ValueError: If a node index is negative or repeated, or the stiffness is not positive definite.
     """
 
     kind: ClassVar[str]
 
     nodes: tuple[int, ...] | None = None
+    stiffness: float | Matrix | None = None
 
     def __post_init__(self) -> None:
+        if self.stiffness is not None:
+            object.__setattr__(self, "stiffness", _stiffness(self.stiffness))
         if self.nodes is not None:
             nodes = tuple(int(node) for node in self.nodes)
             if not nodes or min(nodes) < 0 or len(set(nodes)) != len(nodes):
                 raise ValueError(f"nodes is {self.nodes}; it must name at least one node, each once, from 0")
             object.__setattr__(self, "nodes", nodes)
+
+    @property
+    def stiffness_matrix(self) -> np.ndarray:
+        """``stiffness`` as an array ``(2, 2)`` [N/mm], zero for a fixed obstacle."""
+        return np.zeros((2, 2)) if self.stiffness is None else np.array(self.stiffness)
 
     @property
     @abstractmethod
@@ -68,6 +79,10 @@ class Obstacle(ABC):
     @abstractmethod
     def outline(self) -> np.ndarray:
         """Points of its surface in order, ``(k, 2)`` [mm]: a closed polygon, or the surface point of a half-plane."""
+
+    @abstractmethod
+    def shifted(self, by: Iterable[float]) -> Self:
+        """The same obstacle elsewhere, by a shift (x, y) [mm]."""
 
     def touchable(self, nodes: int) -> np.ndarray:
         """Which of the nodes 0…n can touch it, ``(nodes,)`` bool.
@@ -130,6 +145,10 @@ class Circle(Obstacle):
         """The disc itself."""
         return Extent(self.center, self.radius, 2 * self.radius, self.radius)
 
+    def shifted(self, by: Iterable[float]) -> Self:
+        """The circle elsewhere."""
+        return replace(self, center=_plus(self.center, by))
+
     def outline(self) -> np.ndarray:
         """Points of the circle, ``(k, 2)`` [mm]."""
         return np.array(self.center) + self.radius * _directions()
@@ -166,6 +185,10 @@ class HalfPlane(Obstacle):
     def extent(self) -> Extent:
         """Without bounds, and flat."""
         return Extent(self.point, math.inf, math.inf, math.inf)
+
+    def shifted(self, by: Iterable[float]) -> Self:
+        """The wall elsewhere."""
+        return replace(self, point=_plus(self.point, by))
 
     def outline(self) -> np.ndarray:
         """The point of the surface, ``(1, 2)`` [mm]."""
@@ -210,6 +233,10 @@ class Ellipse(Obstacle):
         small, large = sorted(self.radii)
         return Extent(self.center, large, 2 * small, small**2 / large)
 
+    def shifted(self, by: Iterable[float]) -> Self:
+        """The ellipse elsewhere."""
+        return replace(self, center=_plus(self.center, by))
+
     def outline(self) -> np.ndarray:
         """Points of the ellipse, ``(k, 2)`` [mm]."""
         x, y = self.axis
@@ -253,6 +280,10 @@ class Capsule(Obstacle):
         """The disc about the middle of the line."""
         middle = ((self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2)
         return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, 2 * self.radius, self.radius)
+
+    def shifted(self, by: Iterable[float]) -> Self:
+        """The capsule elsewhere."""
+        return replace(self, start=_plus(self.start, by), end=_plus(self.end, by))
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
@@ -303,6 +334,10 @@ class Polygon(Obstacle):
         farthest = max(math.dist((x, y), corner) for corner in self.corners)
         return Extent((x, y), farthest + self.radius, _width(np.array(self.corners)) + 2 * self.radius, self.radius)
 
+    def shifted(self, by: Iterable[float]) -> Self:
+        """The polygon elsewhere."""
+        return replace(self, corners=tuple(_plus(corner, by) for corner in self.corners))
+
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
         return _rounded(np.array(self.corners), self.radius)
@@ -316,6 +351,24 @@ def _pair(name: str, value: Iterable[float]) -> Pair:
     if not (math.isfinite(x) and math.isfinite(y)):
         raise ValueError(f"{name} is {value}; it must be finite")
     return x, y
+
+
+def _plus(point: Pair, by: Iterable[float]) -> Pair:
+    x, y = by
+    return point[0] + float(x), point[1] + float(y)
+
+
+def _stiffness(value: float | Matrix) -> Matrix:
+    try:
+        matrix = np.array(value, dtype=float)
+        matrix = np.diag([matrix, matrix]) if matrix.ndim == 0 else matrix.reshape(2, 2)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"stiffness is {value!r}; it must be a number or a matrix ((kxx, kxy), (kxy, kyy))") from error
+    definite = matrix[0, 0] > 0 and matrix[0, 0] * matrix[1, 1] > matrix[0, 1] * matrix[1, 0]
+    if not (np.isfinite(matrix).all() and matrix[0, 1] == matrix[1, 0] and definite):
+        raise ValueError(f"stiffness is {value}; it must be finite, symmetric and positive definite")
+    (xx, xy), (_, yy) = matrix.tolist()
+    return (xx, xy), (xy, yy)
 
 
 def _unit(name: str, value: Iterable[float], meaning: str) -> Pair:

@@ -86,7 +86,6 @@ class ReferenceSolver:
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self.robot = robot
         self.scene = scene
-        self._shapes = [value for obstacle in scene for value in obstacle.parameters]
         self._touchable = touchable_points(robot, scene)
         check_width(robot, scene)
         self._sliding = robot.cable == "sliding"
@@ -138,7 +137,7 @@ class ReferenceSolver:
 
     def _build(self) -> None:
         n = self.robot.segments
-        problem = node_problem(self.robot, self.scene.kinds)
+        problem = node_problem(self.robot, self.scene.kinds, self.scene.mounted)
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
         # In units of the free robot's segment angle, so that the tolerances mean the same at every displacement;
         # with a sliding cable a robot bends without any, too.
@@ -159,7 +158,7 @@ class ReferenceSolver:
         self._upper = np.concatenate([np.zeros(3 * n), np.full(bounded.size, np.inf)])
 
     def _parameters(self, cable: float, length: float) -> list[float]:
-        return [cable, length, self.robot.offset_mm, *self._shapes]
+        return [cable, length, self.robot.offset_mm, self.robot.rigidity, *self.scene.parameters]
 
     def _scale(self, cable: float) -> float:
         return TURN**2 if self._sliding else (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
@@ -187,21 +186,23 @@ class ReferenceSolver:
         """The shape that nothing touches."""
         robot = self.robot.at(length)
         angle = free_angle(robot, cable) if self._sliding else 0.0
-        unknowns = self._shape(cable, length, np.full(robot.segments, angle))
+        straight = np.zeros(2 * sum(self.scene.mounted))
+        unknowns = np.r_[self._shape(cable, length, np.full(robot.segments, angle)), straight]
         taut = [free_tension(robot, cable) / robot.stiffness] if self._sliding else []
         return self._balanced(cable, length, unknowns, np.r_[taut, np.zeros(self._touchable[:, :, 1:].size)])
 
     def _balanced(self, cable: float, length: float, unknowns: np.ndarray, pushes: np.ndarray) -> _Point:
         """A shape with multipliers of its inequalities, and those of the equalities by least squares."""
-        derivatives = node_derivatives(self.robot, self.scene.kinds)(unknowns, self._parameters(cable, length))
-        slope, _, equality_slopes, _, gap_slopes = (value.full() for value in derivatives)
+        derivatives = node_derivatives(self.robot, self.scene.kinds, self.scene.mounted)
+        values = derivatives(unknowns, self._parameters(cable, length))
+        slope, _, equality_slopes, _, gap_slopes = (value.full() for value in values)
         balance = gap_slopes.T @ pushes - slope.ravel()
         tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
         return _Point(cable, length, unknowns, np.concatenate([tensions, -pushes]))
 
     def _start(self, equilibrium: Equilibrium) -> _Point:
-        unknowns = np.concatenate([equilibrium.nodes[1:, :2].ravel(), equilibrium.cable_nodes[1:].ravel()])
-        return self._balanced(equilibrium.cable_mm, equilibrium.length_mm, unknowns, equilibrium.pushes)
+        unknowns, _, tensions, pushes = equilibrium.node_solution()
+        return _Point(equilibrium.cable_mm, equilibrium.length_mm, unknowns, -np.concatenate([tensions, pushes]))
 
     def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
         """The solution under another command, ``None`` where IPOPT does not converge to it or leaves the branch."""
@@ -209,7 +210,7 @@ class ReferenceSolver:
             return self._free(cable, length)
         scale = self._scale(cable)
         shape = self._shape(cable, length, self._pose(start.unknowns, start.length).coordinates)
-        guess = self._balanced(cable, length, shape, self._pushes(start))
+        guess = self._balanced(cable, length, np.r_[shape, self._mounts(start)], self._pushes(start))
         solution = self._ipopt(
             x0=guess.unknowns,
             lam_g0=guess.multipliers / scale,
@@ -257,8 +258,11 @@ class ReferenceSolver:
     def _pushes(self, point: _Point) -> np.ndarray:
         return -point.multipliers[3 * self.robot.segments :]
 
+    def _mounts(self, point: _Point) -> np.ndarray:
+        return point.unknowns[4 * self.robot.segments :]
+
     def _pose(self, unknowns: np.ndarray, length: float) -> _Pose:
-        points = unknowns.reshape(2, self.robot.segments, 2)
+        points = unknowns[: 4 * self.robot.segments].reshape(2, self.robot.segments, 2)
         backbone = np.vstack([[0.0, 0.0], points[0]])
         cable = np.vstack([[self.robot.offset_mm, 0.0], points[1]])
         disks, segments = cable - backbone, np.diff(backbone, axis=0)
@@ -274,20 +278,24 @@ class ReferenceSolver:
         nodes = np.column_stack([pose.backbone, pose.angles])
         multipliers = np.zeros(self._touchable.shape)
         multipliers[:, :, 1:] = self._pushes(point)[int(self._sliding) :].reshape(multipliers[:, :, 1:].shape)
+        displacements = np.zeros((len(self.scene), 2))
+        displacements[list(self.scene.mounted)] = self._mounts(point).reshape(-1, 2)
         parts: list[Any] = [
             [point.cable, point.length, self._tension(point), np.sum(pose.turns**2)],
             pose.coordinates,
             nodes,
             pose.cable,
             multipliers,
-            self._gaps(nodes),
+            self._gaps(nodes, displacements),
+            displacements,
         ]
         block = np.concatenate([np.ravel(part) for part in parts])
         return Equilibrium(self.robot, self.scene, block, status, iterations)
 
-    def _gaps(self, nodes: np.ndarray) -> np.ndarray:
+    def _gaps(self, nodes: np.ndarray, displacements: np.ndarray) -> np.ndarray:
         points = touching_points(self.robot, nodes)
-        gaps = np.reshape([obstacle.gap(points) for obstacle in self.scene], self._touchable.shape)
+        moved = zip(self.scene, displacements, strict=True)
+        gaps = np.reshape([obstacle.gap(points - shift) for obstacle, shift in moved], self._touchable.shape)
         return np.where(self._touchable, gaps, np.inf)
 
 

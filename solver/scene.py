@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from solver.obstacles import Obstacle
 
 MAX_OBSTACLES = 32
@@ -37,6 +39,18 @@ class Scene:
 
     def __iter__(self) -> Iterator[Obstacle]:
         return iter(self.obstacles)
+
+    @property
+    def mounted(self) -> tuple[bool, ...]:
+        """Which obstacles are on springs, in order."""
+        return tuple(obstacle.stiffness is not None for obstacle in self.obstacles)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """The shapes, one after the other, then (kxx, kxy, kyy) of every obstacle on a spring [N/mm]."""
+        shapes = [value for obstacle in self.obstacles for value in obstacle.parameters]
+        springs = [obstacle.stiffness_matrix[np.triu_indices(2)] for obstacle in self.obstacles if obstacle.stiffness]
+        return (*shapes, *np.ravel(springs).tolist())
 
     @property
     def kinds(self) -> tuple[str, ...]:

@@ -26,12 +26,14 @@ class Sensitivity:
         multipliers: Of the multipliers, ``(q, m, p, k)`` [rad²/mm per unit]; zero where nothing touches.
         tension: Of the cable tension, ``(q,)`` [N per unit].
         forces: Of the force of each obstacle on the robot, ``(q, m, 2)`` [N per unit].
+        displacements: Of how far each obstacle has been pushed, ``(q, m, 2)`` [mm per unit].
     """
 
     nodes: np.ndarray
     multipliers: np.ndarray
     tension: np.ndarray
     forces: np.ndarray
+    displacements: np.ndarray
 
 
 CABLE, LENGTH = 0, 1  # rows of a Sensitivity
@@ -65,9 +67,11 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
         )
     conditions, varied, loads, load_slopes = _derivatives(equilibrium)
     taut = [equilibrium.tension > 0] if sliding else []
-    kept = np.concatenate([np.ones(7 * robot.segments, bool), taut, active[:, :, 1:].ravel()]).astype(bool)
+    unknowns = conditions.shape[1]
+    equations = unknowns + 3 * robot.segments
+    kept = np.concatenate([np.ones(equations, bool), taut, active[:, :, 1:].ravel()]).astype(bool)
     slopes, varied = conditions[kept], varied[kept]
-    count, unknowns = slopes.shape
+    count = len(slopes)
     kkt = np.zeros((count, count))
     kkt[:, :unknowns] = slopes
     kkt[:unknowns, unknowns:] = -slopes[unknowns:].T
@@ -81,20 +85,23 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
 
     multipliers = np.zeros((len(loads), *active.shape))
     inner = np.zeros((len(loads), active[:, :, 1:].size))
-    inner[:, active[:, :, 1:].ravel()] = change[7 * robot.segments + sum(taut) :].T
+    inner[:, active[:, :, 1:].ravel()] = change[equations + sum(taut) :].T
     multipliers[:, :, :, 1:] = inner.reshape(multipliers[:, :, :, 1:].shape)
     forces = load_changes[:, 2:].reshape(len(loads), len(scene), 4)[:, :, :2]
+    displacements = np.zeros_like(forces)
+    displacements[:, list(scene.mounted)] = change[4 * robot.segments : unknowns].T.reshape(len(loads), -1, 2)
     return Sensitivity(
-        nodes=_node_slopes(equilibrium, change[:unknowns].T),
+        nodes=_node_slopes(equilibrium, change[: 4 * robot.segments].T),
         multipliers=multipliers,
         tension=equilibrium.stiffness * load_changes[:, CABLE],
         forces=equilibrium.stiffness * forces,
+        displacements=displacements,
     )
 
 
 def _derivatives(equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """``F_z, F_v, L_v, L_vv`` of :func:`solver.formulation.kkt_derivatives` at an equilibrium."""
-    function = kkt_derivatives(equilibrium.robot, equilibrium.scene.kinds)
+    function = kkt_derivatives(equilibrium.robot, equilibrium.scene.kinds, equilibrium.scene.mounted)
     values = function(*equilibrium.node_solution())
     conditions, varied, loads, load_slopes = (value.full() for value in values)
     return conditions, varied, loads.ravel(), load_slopes

@@ -47,6 +47,7 @@ class Solver:
             np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
             np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
             touchable.reshape(len(scene), len(robot.touch) * robot.positions),
+            np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
         )
         straight = np.zeros(self._kernel.block_size)
         straight[1] = robot.length_mm

@@ -21,10 +21,11 @@ using Mask = nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>
 using Kinds = std::vector<int>;
 
 std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& parameters, const Input& extents,
-                                          const Mask& touchable) {
+                                          const Mask& touchable, const Input& stiffness) {
   const std::size_t count = kinds.size(), points = touchable.shape(1);
-  if (parameters.size() != ccr::kShapeSize * count || extents.size() != 4 * count || touchable.shape(0) != count)
-    throw std::invalid_argument("one row of parameters, extents and touchable points per obstacle");
+  if (parameters.size() != ccr::kShapeSize * count || extents.size() != 4 * count || touchable.shape(0) != count ||
+      stiffness.size() != 4 * count)
+    throw std::invalid_argument("one row of parameters, extents, touchable points and stiffness per obstacle");
   std::vector<ccr::Obstacle> obstacles(count);
   for (std::size_t i = 0; i < count; ++i) {
     ccr::Obstacle& obstacle = obstacles[i];
@@ -34,6 +35,8 @@ std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& param
     obstacle.center = {{extent[0], extent[1]}};
     obstacle.radius = extent[2];
     obstacle.fineness = extent[3];
+    std::copy_n(stiffness.data() + 4 * i, 4, obstacle.stiffness.v.begin());
+    obstacle.mounted = obstacle.stiffness(0, 0) > 0;
     obstacle.touchable.assign(touchable.data() + points * i, touchable.data() + points * (i + 1));
   }
   return obstacles;
@@ -57,9 +60,9 @@ class Kernel {
  public:
   Kernel(bool sliding, int segments, double offset, double rigidity, double max_tension, double max_length,
          const std::vector<double>& lines, int between, const Kinds& kinds, const Input& parameters,
-         const Input& extents, const Mask& touchable) {
+         const Input& extents, const Mask& touchable, const Input& stiffness) {
     const ccr::Robot robot{segments, offset, rigidity, max_tension, max_length, lines, between};
-    const auto obstacles = read_obstacles(kinds, parameters, extents, touchable);
+    const auto obstacles = read_obstacles(kinds, parameters, extents, touchable, stiffness);
     if (sliding)
       branch_ = std::make_unique<ccr::Branch<ccr::SlidingCable>>(robot, obstacles);
     else
@@ -101,9 +104,9 @@ NB_MODULE(_kernel, m) {
         "Write value, x and y slope of the gap of each point to one obstacle.");
   nb::class_<Kernel>(m, "Kernel", "Solver of one robot in one scene; holds scratch memory and no state between calls.")
       .def(nb::init<bool, int, double, double, double, double, const std::vector<double>&, int, const Kinds&,
-                    const Input&, const Input&, const Mask&>(),
+                    const Input&, const Input&, const Mask&, const Input&>(),
            "sliding"_a, "segments"_a, "offset"_a, "rigidity"_a, "max_tension"_a, "max_length"_a, "lines"_a,
-           "between"_a, "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a)
+           "between"_a, "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "stiffness"_a)
       .def_prop_ro("block_size", &Kernel::block_size, "Length of an equilibrium's block.")
       .def("step", &Kernel::step, "from_"_a, "cable"_a, "length"_a, "to"_a,
            "Follow the branch from one block to a cable displacement and length into another; returns (status, iterations).")

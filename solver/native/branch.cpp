@@ -27,13 +27,14 @@ Branch<Model>::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles
       levers_(robot.segments + 1),
       points_(robot.points()) {
   present_.controls.resize(robot.segments);
+  present_.mounts.resize(newton_.chain.mounts());
   trial_ = present_;
 }
 
 template <class Model>
 std::size_t Branch<Model>::block_size() const {
   const std::size_t n = present_.controls.size();
-  return 4 + n + 5 * (n + 1) + 2 * newton_.chain.contacts();
+  return 4 + n + 5 * (n + 1) + 2 * newton_.chain.contacts() + 2 * newton_.chain.obstacles().size();
 }
 
 template <class Model>
@@ -46,7 +47,13 @@ void Branch<Model>::load(const double* block) {
   for (std::size_t i = 0; i <= n; ++i) nodes_[i] = {{block[3 * i], block[3 * i + 1]}};
   block += 3 * (n + 1);
   for (std::size_t i = 0; i <= n; ++i, block += 2) levers_[i] = {{block[0] - nodes_[i][0], block[1] - nodes_[i][1]}};
-  newton_.chain.look_around(nodes_);
+  const double* displacements = block + 2 * newton_.chain.contacts();
+  for (std::size_t j = 0; j < newton_.chain.obstacles().size(); ++j, displacements += 2) {
+    const int mount = newton_.chain.mount_of(j);
+    if (mount >= 0) present_.mounts[mount] = {{displacements[0], displacements[1]}};
+  }
+  mounts_ = present_.mounts;
+  newton_.chain.look_around(nodes_, present_.mounts);
   place_points(newton_.chain.robot(), nodes_, levers_, points_);
   ActiveSet& active = present_.active;
   active.count = 0;
@@ -80,11 +87,17 @@ void Branch<Model>::store(double* block) const {
     if (present_.active.contact[j] < chain.contacts()) block[present_.active.contact[j]] = present_.active.multiplier[j];
   block += chain.contacts();
   chain.survey(block);
+  block += chain.contacts();
+  for (std::size_t j = 0; j < chain.obstacles().size(); ++j) {
+    const int mount = chain.mount_of(j);
+    for (int k = 0; k < 2; ++k) *block++ = mount < 0 ? 0.0 : present_.mounts[mount][k];
+  }
 }
 
 template <class Model>
 void Branch<Model>::remember() {
   points_ = newton_.chain.points();
+  mounts_ = present_.mounts;
   if (!trace) return;
   for (const auto& s : newton_.chain.states()) trace->insert(trace->end(), s.v.begin(), s.v.begin() + 3);
 }
@@ -100,7 +113,7 @@ void Branch<Model>::accept() {
 template <class Model>
 void Branch<Model>::settle() {
   if (settled_) return;
-  newton_.chain.evaluate(present_.controls, present_.command);
+  newton_.chain.evaluate(present_);
   newton_.chain.reduced_gradient(present_.active);
   tension_ = newton_.chain.tension(present_.active);
   settled_ = true;
@@ -111,27 +124,32 @@ template <class Model>
 bool Branch<Model>::passable(double allowed) const {
   const Chain<Model>& chain = newton_.chain;
   const int points = chain.robot().points();
-  double farthest = 0;
+  double farthest = 0, shift = 0;
   for (int k = 0; k < points; ++k) {
-    const double dx = chain.points()[k][0] - points_[k][0], dy = chain.points()[k][1] - points_[k][1];
-    farthest = std::max(farthest, dx * dx + dy * dy);
+    const Position move = minus(chain.points()[k], points_[k]);
+    farthest = std::max(farthest, dot(move, move));
   }
-  if (farthest > allowed * allowed) return false;
   farthest = std::sqrt(farthest);
+  for (std::size_t m = 0; m < trial_.mounts.size(); ++m)
+    shift = std::max(shift, norm(minus(trial_.mounts[m], mounts_[m])));
+  if (std::max(farthest, shift) > allowed) return false;
   for (std::size_t j = 0; j < chain.obstacles().size(); ++j) {
     const Obstacle& obstacle = chain.obstacles()[j];
-    if (farthest <= kSweepStride * obstacle.fineness || chain.far(static_cast<int>(j), farthest)) continue;
+    if (farthest + shift <= kSweepStride * obstacle.fineness || chain.far(static_cast<int>(j), farthest)) continue;
+    const int mount = chain.mount_of(j);
+    const Position before = mount < 0 ? Position{} : mounts_[mount], now = mount < 0 ? Position{} : trial_.mounts[mount];
     for (int k = 0; k < points; ++k)
-      if (obstacle.touchable[k] && !passes(obstacle, points_[k], chain.points()[k])) return false;
+      if (obstacle.touchable[k] && !passes(obstacle, minus(points_[k], before), minus(chain.points()[k], now)))
+        return false;
   }
   return true;
 }
 
 template <class Model>
-bool Branch<Model>::attempt_free(const Command& command) {
+bool Branch<Model>::attempt_free() {
   if (newton_.chain.touching(trial_.active)) return false;
-  newton_.chain.relax(command, trial_.controls, trial_.active);
-  return newton_.chain.evaluate(trial_.controls, command) && newton_.chain.violation() <= kFeasibility;
+  newton_.chain.relax(trial_);
+  return newton_.chain.evaluate(trial_) && newton_.chain.violation() <= kFeasibility;
 }
 
 // Leaves in `trial_` the equilibrium under another command, if it continues the branch from `present_`.
@@ -140,9 +158,10 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   settled_ = false;
   trial_ = present_;
   trial_.command = command;
-  if (!attempt_free(command)) {
+  if (!attempt_free()) {
     if (!Model::kSliding && command.cable <= 0) return Move::kRejected;
     trial_.controls = present_.controls;
+    trial_.mounts = present_.mounts;
     trial_.active = present_.active;
     const Verdict verdict = newton_.solve(trial_);
     iterations += verdict.iterations;
@@ -195,11 +214,11 @@ bool Branch<Model>::approach_limit() {
 // The quadratic end of a descent, where Newton's method stays close and loses energy.
 template <class Model>
 bool Branch<Model>::finish() {
-  const double energy = newton_.chain.objective();
+  const double energy = newton_.chain.energy();
   trial_ = present_;
   const Verdict verdict = newton_.solve(trial_);
   iterations += verdict.iterations;
-  if (!verdict.converged || newton_.chain.objective() > energy || !passable(kDescentMove)) return false;
+  if (!verdict.converged || newton_.chain.energy() > energy || !passable(kDescentMove)) return false;
   std::swap(present_, trial_);
   remember();
   return true;
@@ -233,12 +252,13 @@ template <class Model>
 Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
   const Iterate start = present_;
   const bool holding = !releases(command);  // the motor
-  const std::vector<Position> start_points = points_;
+  const std::vector<Position> start_points = points_, start_mounts = mounts_;
   const std::size_t start_trace = trace ? trace->size() : 0;
   settled_ = false;
   const auto undo = [&](End reason) {
     present_ = start;
     points_ = start_points;
+    mounts_ = start_mounts;
     if (trace) trace->resize(start_trace);
     settled_ = false;
     settle();

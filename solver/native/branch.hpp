@@ -45,7 +45,7 @@ class Branch : public Follower {
   Status follow(const Command& target);
   double goal_cable(double target) const;
   Move attempt(const Command& command);
-  bool attempt_free(const Command& command);
+  bool attempt_free();
   bool approach_limit();
   bool at_limit() const;
   bool releases(const Command& command) const;
@@ -62,7 +62,7 @@ class Branch : public Follower {
   Iterate present_, trial_;
   double tension_ = 0, trial_tension_ = 0;
   std::vector<Position> nodes_, levers_;  // of the block last read
-  std::vector<Position> points_;          // of `present_`
+  std::vector<Position> points_, mounts_;  // of the last accepted shape
   bool settled_ = false;                  // whether the chain is evaluated at `present_`
 };
 

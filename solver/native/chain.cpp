@@ -52,6 +52,7 @@ Chain<Model>::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
       levers_(robot.segments + 1),
       points_(robot.points()),
       gaps_(obstacles.size() * points_.size() + Model::kSliding, std::numeric_limits<double>::infinity()),
+      mount_of_(obstacles.size(), -1),
       pulls_(robot.segments + 1),
       adjoints_(robot.segments),
       gradient_(robot.segments) {
@@ -60,23 +61,43 @@ Chain<Model>::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
   for (const double line : robot.lines)
     for (int k = 0; k < robot.positions(); ++k)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line / robot.offset});
+  for (std::size_t j = 0; j < obstacles.size(); ++j)
+    if (obstacles[j].mounted) {
+      mount_of_[j] = mounts();
+      springs_.push_back(obstacles[j].stiffness);
+    }
+  mount_origin_.resize(mounts());
+  displacements_.resize(mounts());
+  mount_gradient_.resize(mounts());
   for (const double line : robot.lines) reach_ = std::max(reach_, std::abs(line));
   reach_ += limits::kReach + (robot.between > 0 ? robot.max_length / robot.segments : 0);
 }
 
 template <class Model>
-void Chain<Model>::look_around(std::span<const Position> nodes) {
+void Chain<Model>::look_around(std::span<const Position> nodes, const std::vector<Position>& mounts) {
   std::copy(nodes.begin(), nodes.end(), origin_.begin());
-  for (std::size_t j = 0; j < obstacles_.size(); ++j) clear_[j] = clearance(obstacles_[j], nodes) - reach_;
+  mount_origin_ = mounts;
+  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
+    clear_[j] = clearance(obstacles_[j], nodes) - reach_;
+    if (mount_of_[j] >= 0) clear_[j] -= norm(mounts[mount_of_[j]]);
+  }
 }
 
 template <class Model>
-bool Chain<Model>::evaluate(const std::vector<Control>& controls, const Command& command) {
+bool Chain<Model>::far(int obstacle, double motion) const {
+  const int mount = mount_of_[obstacle];
+  if (mount >= 0) motion += norm(minus(displacements_[mount], mount_origin_[mount]));
+  return clear_[obstacle] > drift_ + motion;
+}
+
+template <class Model>
+bool Chain<Model>::evaluate(const Iterate& at) {
+  const Command& command = at.command;
   const int n = robot_.segments;
   pull_ = command.cable / n;
   length_ = command.length / n;
   objective_ = steepest_ = 0;
-  Model::bend(n, controls[0].v.data(), pull_, length_, robot_.offset, bends_.data());
+  Model::bend(n, at.controls[0].v.data(), pull_, length_, robot_.offset, bends_.data());
   states_[0] = {};
   levers_[0] = {{robot_.offset, 0}};
   const double scale = length_ / robot_.offset;
@@ -98,6 +119,7 @@ bool Chain<Model>::evaluate(const std::vector<Control>& controls, const Command&
     widest = std::max(widest, std::abs(bend.angle));
   }
   if (!std::isfinite(objective_) || (Model::kSliding && widest > limits::kWidestTurn)) return false;
+  load_springs(at.mounts);
   for (int i = 0; i <= n; ++i) nodes_[i] = {{states_[i][0], states_[i][1]}};
   place_points(robot_, nodes_, levers_, points_);
   measure_gaps(Model::kSliding ? states_[n][Model::kState - 1] - command.cable : 0);
@@ -105,8 +127,22 @@ bool Chain<Model>::evaluate(const std::vector<Control>& controls, const Command&
 }
 
 template <class Model>
-void Chain<Model>::relax(const Command& command, std::vector<Control>& controls, ActiveSet& active) const {
-  active.count = 0;
+void Chain<Model>::load_springs(const std::vector<Position>& mounts) {
+  displacements_ = mounts;
+  energy_ = objective_;
+  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
+    const int mount = mount_of_[j];
+    if (mount < 0) continue;
+    for (int k = 0; k < 4; ++k) springs_[mount][k] = obstacles_[j].stiffness[k] / stiffness();
+    energy_ += dot(mounts[mount], times(springs_[mount], mounts[mount])) / 2;
+  }
+}
+
+template <class Model>
+void Chain<Model>::relax(Iterate& at) const {
+  const Command& command = at.command;
+  at.active.count = 0;
+  std::fill(at.mounts.begin(), at.mounts.end(), Position{});
   Control each{};
   if constexpr (Model::kSliding) {
     if (command.cable > 0) {
@@ -117,12 +153,12 @@ void Chain<Model>::relax(const Command& command, std::vector<Control>& controls,
         Model::bend(1, each.v.data(), pull, length, robot_.offset, &bend);
         each[0] -= (bend.taken - pull) / bend.taken_slope;
       }
-      active.contact[0] = contacts();
-      active.multiplier[0] = 2 * each[0] / bend.taken_slope;
-      active.count = 1;
+      at.active.contact[0] = contacts();
+      at.active.multiplier[0] = 2 * each[0] / bend.taken_slope;
+      at.active.count = 1;
     }
   }
-  std::fill(controls.begin(), controls.end(), each);
+  std::fill(at.controls.begin(), at.controls.end(), each);
 }
 
 // Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
@@ -140,9 +176,10 @@ void Chain<Model>::measure_gaps(double slack) {
   for (int j = 0; j < static_cast<int>(obstacles_.size()); ++j) {
     if (far(j, 0)) continue;
     const Obstacle& obstacle = obstacles_[j];
+    const Position moved = mount_of_[j] < 0 ? Position{} : displacements_[mount_of_[j]];
     const int first = j * robot_.points();
     for (int i = 0; i <= n; ++i) {
-      const double distance = clearance(obstacle, nodes_[i]) - reach_;
+      const double distance = clearance(obstacle, minus(nodes_[i], moved)) - reach_;
       if (distance > 0) {
         i += static_cast<int>(std::min(distance / length_, static_cast<double>(n)));
         continue;
@@ -150,7 +187,7 @@ void Chain<Model>::measure_gaps(double slack) {
       for (int start = i * stride; start < robot_.points(); start += robot_.positions())
         for (int k = start; k < start + (i < n ? stride : 1); ++k) {
           if (!obstacle.touchable[k]) continue;
-          gaps_[first + k] = measure_gap(obstacle, points_[k]).value;
+          gaps_[first + k] = measure_gap(obstacle, minus(points_[k], moved)).value;
           near_.push_back(first + k);
         }
     }
@@ -163,23 +200,42 @@ void Chain<Model>::measure_gaps(double slack) {
 
 template <class Model>
 void Chain<Model>::survey(double* gaps) const {
-  for (const Obstacle& obstacle : obstacles_) {
-    ccr::measure_gaps(obstacle, points_, gaps);
+  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
+    const Position moved = mount_of_[j] < 0 ? Position{} : displacements_[mount_of_[j]];
+    ccr::measure_gaps(obstacles_[j], points_, moved, gaps);
     for (std::size_t k = 0; k < points_.size(); ++k)
-      if (!obstacle.touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
+      if (!obstacles_[j].touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
     gaps += points_.size();
   }
 }
 
 template <class Model>
-Chain<Model>::Force Chain<Model>::slope(int contact) const {
+Position Chain<Model>::point(int contact) const {
+  const int mount = this->mount(contact);
+  const Position& point = points_[contact % points_.size()];
+  return mount < 0 ? point : minus(point, displacements_[mount]);
+}
+
+template <class Model>
+Gap Chain<Model>::gap(int contact) const {
+  return measure_gap(obstacle(contact), point(contact));
+}
+
+template <class Model>
+Chain<Model>::Slope Chain<Model>::slope(int contact) const {
   if constexpr (Model::kSliding)
-    if (contact == contacts()) return {robot_.segments, false, {{0, 0, 0, 1}}, {}};
-  const Gap gap = measure_gap(obstacle(contact), point(contact));
+    if (contact == contacts()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
+  const Gap gap = this->gap(contact);
+  const Position normal = {{gap.x, gap.y}};
+  return {force(contact, normal), mount(contact), normal};
+}
+
+template <class Model>
+Chain<Model>::Force Chain<Model>::force(int contact, const Position& on_point) const {
   const Site& site = this->site(contact);
   const auto share = [&](double weight, const Position& lever) {
-    const double turn = site.lever * (gap.y * lever[0] - gap.x * lever[1]);
-    return State{{weight * gap.x, weight * gap.y, weight * turn}};
+    const double turn = site.lever * (on_point[1] * lever[0] - on_point[0] * lever[1]);
+    return State{{weight * on_point[0], weight * on_point[1], weight * turn}};
   };
   const double t = site.fraction;
   if (t == 0) return {site.node, false, share(1, levers_[site.node]), {}};
@@ -215,8 +271,11 @@ double Chain<Model>::tolerance() const {
 template <class Model>
 void Chain<Model>::reduced_gradient(const ActiveSet& active) {
   std::fill(pulls_.begin(), pulls_.end(), State{});
+  for (std::size_t m = 0; m < springs_.size(); ++m) mount_gradient_[m] = times(springs_[m], displacements_[m]);
   for (int j = 0; j < active.count; ++j) {
-    const Force force = slope(active.contact[j]);
+    const auto& [force, mount, normal] = slope(active.contact[j]);
+    if (mount >= 0)
+      for (int k = 0; k < 2; ++k) mount_gradient_[mount][k] += active.multiplier[j] * normal[k];
     for (int k = 0; k < Model::kState; ++k) {
       pulls_[force.node][k] += active.multiplier[j] * force.here[k];
       if (force.split) pulls_[force.node + 1][k] += active.multiplier[j] * force.next[k];
@@ -262,7 +321,7 @@ void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     if (contact == contacts()) continue;  // linear in the state
-    const Gap gap = measure_gap(obstacle(contact), point(contact));
+    const Gap gap = this->gap(contact);
     const Site& site = this->site(contact);
     // Its Hessian in the states of the nodes beside it: J_aᵀ C J_b, and the curvature of the turn of each lever.
     const auto motion = [&](double weight, const Position& lever) {

@@ -79,6 +79,14 @@ struct ActiveSet {
   }
 };
 
+// A shape and what holds it: coordinates of the segments, displacements of the mounted obstacles, contacts that push.
+struct Iterate {
+  Command command{};
+  std::vector<Control> controls;
+  std::vector<Position> mounts;
+  ActiveSet active;
+};
+
 // The points of all lines, from backbone points and levers of the nodes.
 void place_points(const Robot& robot, std::span<const Position> nodes, std::span<const Position> levers,
                   std::vector<Position>& points);
@@ -90,16 +98,29 @@ class Chain {
   using System = ccr::System<Model>;
   using Force = typename System::Force;
 
+  // Of a gap in the states of the nodes beside its point, and in the displacement of the mount it is on, which is
+  // that of the point with the opposite sign.
+  struct Slope {
+    Force force;
+    int mount;  // -1 for an obstacle that is fixed
+    Position normal;
+
+    template <class Direction>
+    double along(const Direction& d) const {
+      return force.along(d.states) - (mount < 0 ? 0.0 : dot(normal, d.mounts[mount]));
+    }
+  };
+
   Chain(const Robot& robot, const std::vector<Obstacle>& obstacles);
 
   // Measures how far each obstacle is from a shape, so that it can be passed over while the robot stays close to it.
-  void look_around(std::span<const Position> nodes);
+  void look_around(std::span<const Position> nodes, const std::vector<Position>& mounts);
 
-  // Shape under a command; false when a coordinate leaves the range of the segment law.
-  bool evaluate(const std::vector<Control>& controls, const Command& command);
+  // Shape under the command; false when a coordinate leaves the range of the segment law.
+  bool evaluate(const Iterate& at);
 
   // The shape that no obstacle touches, which is known, and what holds it.
-  void relax(const Command& command, std::vector<Control>& controls, ActiveSet& active) const;
+  void relax(Iterate& at) const;
 
   // Slope of the Lagrangian J - Σ λ c with respect to the controls, with the adjoints it is made of.
   void reduced_gradient(const ActiveSet& active);
@@ -113,6 +134,7 @@ class Chain {
   bool touching(const ActiveSet& active) const;  // any obstacle
 
   double objective() const { return objective_; }
+  double energy() const { return energy_; }  // the objective and that of the springs, over the stiffness [rad^2]
   double violation() const;  // largest -gap, at least 0
   double steepest() const { return steepest_; }  // largest slope of the objective alone
   double tolerance() const;  // of the slope of the Lagrangian
@@ -123,9 +145,16 @@ class Chain {
   // Contacts within reach, and the gap of every contact, infinite for those that are not.
   const std::vector<int>& near() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
-  bool far(int obstacle, double motion) const { return clear_[obstacle] > drift_ + motion; }  // even after this motion
+  bool far(int obstacle, double motion) const;  // from any point, even after such a motion
   void survey(double* gaps) const;  // of every contact, whether within reach or not
-  Force slope(int contact) const;  // of a gap with respect to the states of the nodes beside it
+  Gap gap(int contact) const;                                 // with its derivatives in the point
+  Force force(int contact, const Position& on_point) const;   // on the nodes, of one on the point
+  Slope slope(int contact) const;
+  int mounts() const { return static_cast<int>(springs_.size()); }
+  int mount(int contact) const { return contact == contacts() ? -1 : mount_of_[contact / points_.size()]; }
+  int mount_of(int obstacle) const { return mount_of_[obstacle]; }
+  const Mat<2, 2>& spring(int mount) const { return springs_[mount]; }  // its stiffness over that of the robot
+  const std::vector<Position>& mount_gradient() const { return mount_gradient_; }
   double lever_arm(int contact) const;  // of its motion per unit of a control, about [mm]
   const std::vector<Control>& gradient() const { return gradient_; }
 
@@ -137,17 +166,19 @@ class Chain {
   };
 
   const Obstacle& obstacle(int contact) const { return obstacles_[contact / points_.size()]; }
-  const Position& point(int contact) const { return points_[contact % points_.size()]; }
+  Position point(int contact) const;  // in the frame of the mount
   const Site& site(int contact) const { return sites_[contact % points_.size()]; }
+  void load_springs(const std::vector<Position>& mounts);
   void measure_gaps(double slack);
 
   Robot robot_;
   std::vector<Obstacle> obstacles_;
   double reach_ = 0;  // from a node, within which its points may be near an obstacle
   double pull_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
-  double objective_ = 0, steepest_ = 0;
+  double objective_ = 0, energy_ = 0, steepest_ = 0;
   std::vector<typename Model::Bend> bends_;
   std::vector<Position> origin_;  // nodes of the shape looked around from
+  std::vector<Position> mount_origin_;  // mounts of that shape
   std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach
   double drift_ = 0;              // how far they have
   std::vector<State> states_;
@@ -157,6 +188,10 @@ class Chain {
   std::vector<Site> sites_;  // of the points
   std::vector<double> gaps_;
   std::vector<int> near_;
+  std::vector<int> mount_of_;            // obstacle, -1 for a fixed one
+  std::vector<Mat<2, 2>> springs_;       // of the mounts
+  std::vector<Position> displacements_;  // of the mounts
+  std::vector<Position> mount_gradient_;
   std::vector<State> pulls_;     // Σ λ ∇c at each node
   std::vector<State> adjoints_;  // of the state each segment leads to
   std::vector<Control> gradient_;

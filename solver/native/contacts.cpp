@@ -10,28 +10,21 @@ namespace ccr {
 using namespace limits;
 
 template <class Model>
-void Direction<Model>::add(double scale, const Direction& other) {
-  for (std::size_t i = 0; i < controls.size(); ++i) controls[i][0] += scale * other.controls[i][0];
-  for (std::size_t i = 0; i < states.size(); ++i)
-    for (int k = 0; k < Model::kState; ++k) states[i][k] += scale * other.states[i][k];
-}
-
-template <class Model>
-Contacts<Model>::Contacts(int segments)
-    : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments)), loads_(kMaxActive + 1) {}
+Contacts<Model>::Contacts(int segments, int mounts)
+    : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments, mounts)), loads_(kMaxActive + 1) {}
 
 template <class Model>
 Contacts<Model>::Load Contacts<Model>::load(const Chain& chain, int contact, int j) {
   slopes_[j] = chain.slope(contact);
-  return {nullptr, slopes_[j], responses_[j].controls.data(), responses_[j].states.data()};
+  return {&slopes_[j], &responses_[j]};
 }
 
 // What the penalty on the active gaps adds to a step while they are not closed.
 template <class Model>
-void Contacts<Model>::penalize(const Chain& chain, const std::vector<double>& penalty, const ActiveSet& active,
-                        Direction& step) const {
+void Contacts<Model>::penalize(const Chain& chain, const Hessian& hessian, const ActiveSet& active,
+                               Direction& step) const {
   for (int j = 0; j < active.count; ++j)
-    if (penalty[j] != 0) step.add(-penalty[j] * chain.gaps()[active.contact[j]], responses_[j]);
+    if (hessian.penalty(j) != 0) step.add(-hessian.penalty(j) * chain.gaps()[active.contact[j]], responses_[j]);
 }
 
 // Takes a contact out, with its slope and response; `responses` counts those in use.
@@ -111,11 +104,11 @@ void Contacts<Model>::settle(const Chain& chain, ActiveSet& active, Direction& s
 
 // Adds a violated gap by dual steps: its multiplier grows until it is closed, releasing whatever turns negative.
 template <class Model>
-bool Contacts<Model>::admit(const Chain& chain, System& system, int contact, ActiveSet& active, Direction& step) {
+bool Contacts<Model>::admit(const Chain& chain, Hessian& hessian, int contact, ActiveSet& active, Direction& step) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   if (active.count == kMaxActive) return false;
   const Load newcomer = load(chain, contact, active.count);
-  system.respond({&newcomer, 1});
+  hessian.respond(chain, {&newcomer, 1});
   double multiplier = 0;
   for (;;) {
     const int count = active.count;
@@ -161,12 +154,15 @@ int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, 
   double reach = 0;  // of any point under the step
   for (const State<Model>& d : step.states)
     reach = std::max(reach, std::abs(d[0]) + std::abs(d[1]) + chain.robot().offset * std::abs(d[2]));
+  double shift = 0;  // of any mount
+  for (const Position& d : step.mounts) shift = std::max(shift, std::abs(d[0]) + std::abs(d[1]));
+  reach += shift;
   int worst = -1;
   double lowest = -kFeasibility / 2;
   for (const int c : chain.near()) {
     const double gap = chain.gaps()[c];
     if (gap > 2 * reach && c < chain.contacts()) continue;
-    const double predicted = gap + chain.slope(c).along(step.states);
+    const double predicted = gap + chain.slope(c).along(step);
     const auto end = active.contact.begin() + active.count;
     if (predicted < lowest && std::find(active.contact.begin(), end, c) == end) {
       lowest = predicted;
@@ -177,41 +173,46 @@ int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, 
 }
 
 template <class Model>
-bool Contacts<Model>::solve(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
-                     ActiveSet& active, Direction& step) {
-  int count = 0;
-  for (; count < active.count; ++count) loads_[count] = load(chain, active.contact[count], count);
-  if (slope) {
-    loads_[count++] = {slope, {}, step.controls.data(), step.states.data()};
-  } else {
-    std::fill(step.controls.begin(), step.controls.end(), Control{});
-    std::fill(step.states.begin(), step.states.end(), State<Model>{});
-  }
-  system.respond(std::span(loads_).first(count));
-  penalize(chain, penalty, active, step);
+bool Contacts<Model>::meet(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
   settle(chain, active, step);
   for (int change = 0; change < kActiveSetChanges; ++change) {
     const int contact = most_violated(chain, active, step);
     if (contact < 0) return true;
-    if (!admit(chain, system, contact, active, step)) return false;
+    if (!admit(chain, hessian, contact, active, step)) return false;
   }
   return false;
 }
 
 template <class Model>
-bool Contacts<Model>::correct(const Chain& chain, System& system, const Control* slope, const std::vector<double>& penalty,
-                       ActiveSet& active, Direction& step) {
-  const Load load{slope, {}, step.controls.data(), step.states.data()};
-  system.respond({&load, 1});
-  penalize(chain, penalty, active, step);
+bool Contacts<Model>::solve(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
+  int count = 0;
+  for (; count < active.count; ++count) loads_[count] = load(chain, active.contact[count], count);
+  loads_[count++] = {nullptr, &step};
+  hessian.respond(chain, std::span(loads_).first(count));
+  penalize(chain, hessian, active, step);
+  return meet(chain, hessian, active, step);
+}
+
+template <class Model>
+bool Contacts<Model>::restore(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
+  for (int j = 0; j < active.count; ++j) loads_[j] = load(chain, active.contact[j], j);
+  std::fill_n(active.multiplier.begin(), active.count, kHeld);
+  step.clear();
+  hessian.respond(chain, std::span(loads_).first(active.count));
+  return meet(chain, hessian, active, step);
+}
+
+template <class Model>
+bool Contacts<Model>::correct(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
+  const Load load{nullptr, &step};
+  hessian.respond(chain, {&load, 1});
+  penalize(chain, hessian, active, step);
   if (!factor(active)) return false;
   push(closing(chain, active, step), active, step);
   const auto end = active.multiplier.begin() + active.count;
   return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
 }
 
-template struct Direction<UniformCable>;
-template struct Direction<SlidingCable>;
 template class Contacts<UniformCable>;
 template class Contacts<SlidingCable>;
 

@@ -24,6 +24,7 @@ inline constexpr int kBacktracks = 6;
 inline constexpr double kReach = 10.0;
 
 // Active set.
+inline constexpr int kMaxObstacles = 32;
 inline constexpr int kMaxActive = 32;
 inline constexpr int kActiveSetChanges = 96;
 inline constexpr double kDependent = 1e-12;    // relative curvature below which a gap depends on the active ones

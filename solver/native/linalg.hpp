@@ -52,6 +52,17 @@ double dot(const Vec<N>& a, const Vec<N>& b) {
   return sum;
 }
 
+template <int N>
+Vec<N> minus(Vec<N> a, const Vec<N>& b) {
+  a -= b;
+  return a;
+}
+
+template <int N>
+double norm(const Vec<N>& a) {
+  return std::sqrt(dot(a, a));
+}
+
 // Factors a symmetric matrix in place as L D Lᵀ: unit L below the diagonal, 1/D on it. False unless positive definite.
 template <int N>
 bool factorize(Mat<N, N>& a) {

@@ -10,18 +10,19 @@ using namespace limits;
 template <class Model>
 Newton<Model>::Newton(const Robot& robot, const std::vector<Obstacle>& obstacles)
     : chain(robot, obstacles),
-      system_(robot.segments),
-      contacts_(robot.segments),
-      step_(robot.segments),
-      correction_(robot.segments),
-      penalty_(kMaxActive) {
+      hessian_(robot.segments, chain.mounts()),
+      contacts_(robot.segments, chain.mounts()),
+      step_(robot.segments, chain.mounts()),
+      correction_(step_) {
   trial_.controls.resize(robot.segments);
+  trial_.mounts.resize(chain.mounts());
 }
 
 template <class Model>
 bool Newton<Model>::equilibrium(const ActiveSet& active) const {
   double worst = 0;
   for (const Control& g : chain.gradient()) worst = std::max(worst, std::abs(g[0]));
+  for (const Position& g : chain.mount_gradient()) worst = std::max(worst, chain.robot().max_length * norm(g));
   return worst <= chain.tolerance() && on_surface(active, kFeasibility);
 }
 
@@ -29,12 +30,12 @@ bool Newton<Model>::equilibrium(const ActiveSet& active) const {
 template <class Model>
 bool Newton<Model>::convex(const ActiveSet& active, int penalties) {
   damping_ = 0;
-  shape_system(active, 0);
-  if (system_.factor(0)) return true;
-  double strength = kPenalty * steepest_curvature();
+  hessian_.shape(chain, active, 0);
+  if (hessian_.factor(0)) return true;
+  double strength = kPenalty * hessian_.steepest();
   for (int attempt = 0; active.count > 0 && attempt < penalties; ++attempt, strength *= kPenaltyGrowth) {
-    shape_system(active, strength);
-    if (system_.factor(0)) return true;
+    hessian_.shape(chain, active, strength);
+    if (hessian_.factor(0)) return true;
   }
   return false;
 }
@@ -43,38 +44,10 @@ bool Newton<Model>::convex(const ActiveSet& active, int penalties) {
 template <class Model>
 bool Newton<Model>::convexify(const ActiveSet& active) {
   if (convex(active, kDescentPenalties)) return true;
-  damping_ = kDamping * steepest_curvature();
+  damping_ = kDamping * hessian_.steepest();
   for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
-    if (system_.factor(damping_)) return true;
+    if (hessian_.factor(damping_)) return true;
   return false;
-}
-
-template <class Model>
-void Newton<Model>::shape_system(const ActiveSet& active, double strength) {
-  chain.curvature(active, system_);
-  for (int j = 0; j < active.count; ++j) {
-    penalty_[j] = 0;
-    if (strength == 0) continue;
-    const typename System<Model>::Force slope = chain.slope(active.contact[j]);
-    const double arm = chain.lever_arm(active.contact[j]);
-    penalty_[j] = strength / (arm * arm);
-    const auto outer = [&](const State<Model>& a, const State<Model>& b) {
-      Mat<Model::kState, Model::kState> product;
-      for (int r = 0; r < Model::kState; ++r)
-        for (int c = 0; c < Model::kState; ++c) product(r, c) = penalty_[j] * a[r] * b[c];
-      return product;
-    };
-    system_.node_hessian[slope.node] += outer(slope.here, slope.here);
-    if (!slope.split) continue;
-    system_.node_hessian[slope.node + 1] += outer(slope.next, slope.next);
-    system_.couple(slope.node, outer(slope.here, slope.next));
-  }
-}
-
-// The step to the solution of the quadratic model, and the multipliers there.
-template <class Model>
-bool Newton<Model>::model_step(ActiveSet& target) {
-  return contacts_.solve(chain, system_, chain.gradient().data(), penalty_, target, step_);
 }
 
 template <class Model>
@@ -82,6 +55,7 @@ double Newton<Model>::cap(double largest, const Direction<Model>& step) const {
   double longest = 0;
   for (const State<Model>& d : step.states) longest = std::max({longest, std::abs(d[0]), std::abs(d[1])});
   longest /= chain.robot().max_length;
+  for (const Position& d : step.mounts) longest = std::max(longest, norm(d) / chain.robot().max_length);
   for (const Control& d : step.controls) longest = std::max(longest, std::abs(d[0]));
   return longest > largest ? largest / longest : 1.0;
 }
@@ -90,14 +64,17 @@ template <class Model>
 double Newton<Model>::merit(double weight) const {
   double violation = 0;
   for (const int contact : chain.near()) violation += std::max(0.0, -chain.gaps()[contact]);
-  return chain.objective() + weight * violation;
+  return chain.energy() + weight * violation;
 }
 
 namespace {
 
 template <class Model>
 void advance(const Iterate& from, double scale, const Direction<Model>& step, Iterate& to) {
-  for (std::size_t i = 0; i < from.controls.size(); ++i) to.controls[i][0] = from.controls[i][0] + scale * step.controls[i][0];
+  for (std::size_t i = 0; i < from.controls.size(); ++i)
+    to.controls[i][0] = from.controls[i][0] + scale * step.controls[i][0];
+  for (std::size_t m = 0; m < from.mounts.size(); ++m)
+    for (int k = 0; k < 2; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
 }
 
 // Multipliers a fraction of the way from one set to another.
@@ -117,23 +94,24 @@ void blend(const ActiveSet& from, double scale, ActiveSet& to) {
 // Close to the solution the curvature of the gaps makes the merit reject good steps: Newton is trusted there.
 template <class Model>
 double Newton<Model>::search(const Iterate& at, const ActiveSet& target, double& weight) {
+  trial_.command = at.command;
   if (cap(kDescentCap, step_) == 1) {
     advance(at, 1, step_, trial_);
-    if (chain.evaluate(trial_.controls, at.command)) return 1;
+    if (chain.evaluate(trial_)) return 1;
     return 0;
   }
-  double slope = 0;  // of the objective along the step
+  double slope = 0;  // of the energy along the step
   for (std::size_t i = 0; i < step_.controls.size(); ++i) slope += chain.gradient()[i][0] * step_.controls[i][0];
+  for (std::size_t m = 0; m < step_.mounts.size(); ++m) slope += dot(chain.mount_gradient()[m], step_.mounts[m]);
   for (int j = 0; j < at.active.count; ++j)
-    slope += at.active.multiplier[j] *
-             chain.slope(at.active.contact[j]).along(step_.states);
+    slope += at.active.multiplier[j] * chain.slope(at.active.contact[j]).along(step_);
   for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
   const double before = merit(weight);
-  const double expected = std::min(slope - (before - chain.objective()), 0.0);
+  const double expected = std::min(slope - (before - chain.energy()), 0.0);
   double scale = cap(kNewtonCap, step_);
   for (int backtracks = 0; backtracks <= kBacktracks; ++backtracks, scale /= 2) {
     advance(at, scale, step_, trial_);
-    if (chain.evaluate(trial_.controls, at.command) && merit(weight) <= before + kArmijo * scale * expected) return scale;
+    if (chain.evaluate(trial_) && merit(weight) <= before + kArmijo * scale * expected) return scale;
   }
   return 0;
 }
@@ -141,7 +119,7 @@ double Newton<Model>::search(const Iterate& at, const ActiveSet& target, double&
 template <class Model>
 Verdict Newton<Model>::solve(Iterate& at) {
   Verdict verdict;
-  if (!chain.evaluate(at.controls, at.command)) return verdict;
+  if (!chain.evaluate(at)) return verdict;
   double weight = 0;
   bool close = false;
   for (; verdict.iterations <= kNewtonIterations; ++verdict.iterations) {
@@ -153,19 +131,20 @@ Verdict Newton<Model>::solve(Iterate& at) {
     ActiveSet target = at.active;
     if (close) {  // the last curvature still serves
       close = false;
-      if (contacts_.correct(chain, system_, chain.gradient().data(), penalty_, target, step_)) {
+      if (contacts_.correct(chain, hessian_, target, step_)) {
         advance(at, 1, step_, at);
         at.active = target;
-        if (!chain.evaluate(at.controls, at.command)) return verdict;
+        if (!chain.evaluate(at)) return verdict;
         continue;
       }
       target = at.active;
     }
-    if (!convex(at.active, kPenalties) || !model_step(target)) return verdict;
+    if (!convex(at.active, kPenalties) || !contacts_.solve(chain, hessian_, target, step_)) return verdict;
 
     const double scale = search(at, target, weight);
     if (scale == 0) return verdict;
     std::swap(at.controls, trial_.controls);
+    std::swap(at.mounts, trial_.mounts);
     blend(at.active, scale, target);
     at.active = target;
     close = cap(kNewtonClose, step_) == 1;
@@ -175,30 +154,21 @@ Verdict Newton<Model>::solve(Iterate& at) {
 
 template <class Model>
 bool Newton<Model>::measure(const Iterate& at) {
-  if (!chain.evaluate(at.controls, at.command)) return false;
+  if (!chain.evaluate(at)) return false;
   chain.reduced_gradient(at.active);
-  return convexify(at.active) && system_.factor(damping_ + kMeasureDamping * steepest_curvature());
-}
-
-template <class Model>
-double Newton<Model>::steepest_curvature() const {
-  double steepest = 0;
-  for (const typename System<Model>::Stage& stage : system_.stages) steepest = std::max(steepest, std::abs(stage.huu[0]));
-  return steepest;
+  return convexify(at.active) && hessian_.factor(damping_ + kMeasureDamping * hessian_.steepest());
 }
 
 template <class Model>
 bool Newton<Model>::restore(Iterate& at) {
-  if (!chain.evaluate(at.controls, at.command)) return false;
+  if (!chain.evaluate(at)) return false;
   for (int attempt = 0; attempt < kRestorations; ++attempt) {
     if (on_surface(at.active, kDescentFeasibility)) return true;
     ActiveSet held = at.active;
-    std::fill_n(held.multiplier.begin(), held.count, kHeld);
-    std::fill(penalty_.begin(), penalty_.end(), 0.0);
-    if (!contacts_.solve(chain, system_, nullptr, penalty_, held, correction_)) return false;
+    if (!contacts_.restore(chain, hessian_, held, correction_)) return false;
     if (!(cap(kDescentCap, correction_) == 1)) return false;
     advance(at, 1, correction_, at);
-    if (!chain.evaluate(at.controls, at.command)) return false;
+    if (!chain.evaluate(at)) return false;
   }
   return on_surface(at.active, kDescentFeasibility);
 }
@@ -227,24 +197,25 @@ template <class Model>
 Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   Verdict verdict;
   moved = false;
-  if (!chain.evaluate(at.controls, at.command)) return verdict;
+  if (!chain.evaluate(at)) return verdict;
   chain.reduced_gradient(at.active);
   verdict.converged = equilibrium(at.active) && convex(at.active, kPenalties);
   if (verdict.converged || !convexify(at.active)) return verdict;
   ActiveSet target = at.active;
-  if (!model_step(target)) return verdict;
-  const double before = chain.objective();
+  if (!contacts_.solve(chain, hessian_, target, step_)) return verdict;
+  const double before = chain.energy();
   double scale = cap(largest, step_);
   trial_.command = at.command;
   const ActiveSet touching = closed(target);
   // Restorations are measured by closeness: near a fold the energy hardly resists the motion that ends the branch.
-  if (!system_.factor(damping_ + kMeasureDamping * steepest_curvature())) return verdict;
+  if (!hessian_.factor(damping_ + kMeasureDamping * hessian_.steepest())) return verdict;
   for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= 2) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap that is to push
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
-    if (chain.objective() > before + kEnergyRoundoff * before) continue;
+    if (chain.energy() > before + kEnergyRoundoff * before) continue;
     std::swap(at.controls, trial_.controls);
+    std::swap(at.mounts, trial_.mounts);
     at.active = closed(target);
     moved = true;
     return verdict;

@@ -5,14 +5,9 @@
 
 #include "chain.hpp"
 #include "contacts.hpp"
+#include "hessian.hpp"
 
 namespace ccr {
-
-struct Iterate {
-  Command command{};
-  std::vector<Control> controls;
-  ActiveSet active;
-};
 
 struct Verdict {
   bool converged = false;  // to a stable equilibrium: the curvature is positive along the active gaps
@@ -46,18 +41,14 @@ class Newton {
   bool on_surface(const ActiveSet& active, double tolerance) const;
   bool convex(const ActiveSet& active, int penalties);
   bool convexify(const ActiveSet& active);
-  void shape_system(const ActiveSet& active, double strength);
-  bool model_step(ActiveSet& target);
-  double steepest_curvature() const;
   double cap(double largest, const Direction<Model>& step) const;
   double merit(double weight) const;
   double search(const Iterate& at, const ActiveSet& target, double& weight);
 
-  System<Model> system_;
+  Hessian<Model> hessian_;
   Contacts<Model> contacts_;
   Direction<Model> step_, correction_;
   Iterate trial_;
-  std::vector<double> penalty_;
   double damping_ = 0;
 };
 

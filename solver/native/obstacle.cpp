@@ -43,9 +43,9 @@ Gap measure_gap(const Obstacle& obstacle, const Position& point) {
   return gap;
 }
 
-void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, double* gaps) {
+void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, const Position& moved, double* gaps) {
   with_law(obstacle, [&](auto law) {
-    for (std::size_t k = 0; k < points.size(); ++k) gaps[k] = evaluate(law, obstacle, points[k]).value;
+    for (std::size_t k = 0; k < points.size(); ++k) gaps[k] = evaluate(law, obstacle, minus(points[k], moved)).value;
   });
 }
 

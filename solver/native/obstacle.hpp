@@ -22,6 +22,8 @@ struct Obstacle {
   double radius;                         // of that disc; infinite for a half-plane
   double fineness;                       // smallest radius of its surface; infinite for a half-plane
   std::vector<unsigned char> touchable;  // (lines, positions): whether a point can touch it
+  bool mounted;                          // on a spring; fixed otherwise
+  Mat<2, 2> stiffness;                   // of its spring [N/mm]
 };
 
 struct Gap {
@@ -30,8 +32,8 @@ struct Gap {
 
 Gap measure_gap(const Obstacle& obstacle, const Position& point);
 
-// Gaps of several points, without their derivatives.
-void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, double* gaps);
+// Gaps of several points to an obstacle that has moved, without their derivatives.
+void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, const Position& moved, double* gaps);
 
 // A lower bound of the distance between a point, or the nearest of several, and the obstacle.
 double clearance(const Obstacle& obstacle, const Position& point);

@@ -15,7 +15,7 @@ namespace ccr {
 template <int NX, int NU, class Transition = Mat<NX, NX>>
 class Riccati {
  public:
-  static constexpr int kMaxLoads = limits::kMaxActive + 1;
+  static constexpr int kMaxLoads = std::max(limits::kMaxActive + 1, 2 * limits::kMaxObstacles);
 
   struct Stage {
     Transition a;
@@ -73,10 +73,10 @@ class Riccati {
     }
   };
 
-  // Something to respond to, a slope of the controls or a force, and where its response goes.
+  // Something to respond to, a slope of the controls or forces, and where its response goes.
   struct Load {
     const Vec<NU>* slope;  // (n) or null
-    Force force;           // used where slope is null
+    std::span<const Force> forces;
     Vec<NU>* du;  // (n)
     Vec<NX>* dx;  // (n+1)
   };
@@ -88,8 +88,7 @@ class Riccati {
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
       const Stage& s = stages[i];
       for (std::size_t k = 0; k < loads.size(); ++k) {
-        if (!loads[k].slope) {
-          const Force& force = loads[k].force;
+        for (const Force& force : loads[k].forces) {
           if (force.node == i + 1) v[k] -= force.here;
           if (force.node == i && force.split) v[k] -= force.next;
         }

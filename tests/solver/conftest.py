@@ -1,6 +1,7 @@
 """Helpers of the solver's tests, as fixtures: test folders are not packages."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def inside(points: np.ndarray, polygons: np.ndarray) -> np.ndarray:
 
 
 def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
-    """Whether an obstacle's centre lies in what the backbone or the cable sweeps between consecutive shapes.
+    """Whether the centre of a fixed obstacle lies in what the backbone or the cable sweeps between consecutive shapes.
 
     Args:
         shapes: Node poses (k, n+1, 3).
@@ -37,7 +38,7 @@ def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
     Returns:
         (k-1, m) bool.
     """
-    centres = np.array([obstacle.extent.center for obstacle in scene if np.isfinite(obstacle.extent.radius)])
+    centres = np.array([obstacle.extent.center for obstacle in scene if _still_disc(obstacle)])
     centres = centres.reshape(-1, 2)
     swept = np.zeros((len(shapes) - 1, len(centres)), dtype=bool)
     for line in (shapes[..., :2], cable_points(shapes, robot.offset_mm)):
@@ -47,10 +48,19 @@ def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
     return swept
 
 
+def _still_disc(obstacle: Obstacle) -> bool:
+    return bool(np.isfinite(obstacle.extent.radius)) and obstacle.stiffness is None
+
+
 def clearance(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
     """Smallest gap of each shape to the obstacles of a scene that every node meets, (k,) [mm]."""
     points = np.concatenate([shapes[..., :2], cable_points(shapes, robot.offset_mm)], axis=1)
     return np.min([obstacle.gap(points) for obstacle in scene if obstacle.nodes is None], axis=(0, 2))
+
+
+def random_spring(generator: np.random.Generator) -> float | None:
+    """None for half of the obstacles, from very soft to very stiff for the others [N/mm]."""
+    return 10 ** generator.uniform(-2.5, 1.5) if generator.random() < 0.5 else None
 
 
 def random_shape(generator: np.random.Generator, thinnest: float) -> Obstacle:
@@ -75,9 +85,10 @@ def random_shape(generator: np.random.Generator, thinnest: float) -> Obstacle:
 
 
 def random_shapes(generator: np.random.Generator, thinnest: float = 6) -> Scene:
-    """One to four obstacles of any kind that leave the unactuated robot free."""
+    """One to four obstacles of any kind, fixed or on springs, that leave the unactuated robot free."""
     while True:
-        scene = Scene(random_shape(generator, thinnest) for _ in range(generator.integers(1, 5)))
+        shapes = [random_shape(generator, thinnest) for _ in range(generator.integers(1, 5))]
+        scene = Scene(replace(shape, stiffness=random_spring(generator)) for shape in shapes)
         if free.clearance(Robot.prototype(), scene, 0.0) > 1:
             return scene
 

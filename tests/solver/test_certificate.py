@@ -13,7 +13,11 @@ from solver.formulation import GAP_LAWS
 from solver.robot import CABLES, LINES
 
 obstacles = st.builds(
-    lambda x, y, r: Circle(center=(x, y), radius=r), st.floats(35, 75), st.floats(75, 150), st.floats(10, 16)
+    lambda x, y, radius, stiffness: Circle(center=(x, y), radius=radius, stiffness=stiffness),
+    st.floats(35, 75),
+    st.floats(75, 150),
+    st.floats(10, 16),
+    st.none() | st.floats(0.01, 30),
 )
 scenes = st.lists(obstacles, min_size=1, max_size=3).map(Scene)
 increments = st.lists(st.tuples(st.floats(-0.2, 0.5), st.floats(-1, 1)), min_size=10, max_size=60)
@@ -41,14 +45,17 @@ def test_residuals(cable, scene, start, changes):
 @EVERY_CABLE
 @pytest.mark.parametrize("touch", [{}, {"touch": LINES, "between": 3}], ids=["paper", "everywhere"])
 def test_residuals_of_every_shape(random_shapes, cable, touch):
-    robot, generator, touched = replace(Robot.prototype(), cable=cable, **touch), np.random.default_rng(3), set()
+    robot, generator = replace(Robot.prototype(), cable=cable, **touch), np.random.default_rng(3)
+    touched, springs = set(), 0
     for _ in range(60):
         scene = random_shapes(generator)
+        springs += any(scene.mounted)
         changes = generator.uniform(-0.2, 0.6, 40)
         states = list(follow(Solver(robot, scene), np.column_stack([changes, np.zeros(40)])))
         certify(states)
         touched |= {scene.kinds[j] for state in states for j in state.contact.any(axis=(1, 2)).nonzero()[0]}
     assert touched == set(GAP_LAWS)
+    assert springs > 10
 
 
 def certify(equilibria):
@@ -86,6 +93,7 @@ def test_reference_solver(cable, scene, changes):
 
 def compare(ours, theirs):
     np.testing.assert_allclose(ours.nodes, theirs.nodes, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(ours.displacements, theirs.displacements, rtol=0, atol=1e-6)
     ours_sum, theirs_sum = ours.multipliers.sum(axis=(1, 2)), theirs.multipliers.sum(axis=(1, 2))
     np.testing.assert_allclose(ours_sum, theirs_sum, rtol=1e-5, atol=1e-11)
     np.testing.assert_allclose(ours.tension, theirs.tension, rtol=1e-8, atol=1e-8)

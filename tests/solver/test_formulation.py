@@ -118,19 +118,26 @@ def test_gap_on_the_outline(obstacle):
         assert width == pytest.approx(spans.min(), rel=5e-3)
 
 
+@EVERY_OBSTACLE
+def test_shifted_obstacle(obstacle):
+    points, shift = np.array([(33.0, 91.0), (57.0, 104.0)]), np.array([2.5, -4.0])
+    moved = obstacle.shifted(shift)
+    assert moved.gap(points + shift) == pytest.approx(obstacle.gap(points), abs=1e-12)
+    assert moved.outline() == pytest.approx(obstacle.outline() + shift, abs=1e-12)
+
+
 def test_node_problem_at_a_solution(circles, pulls):
     robot = Robot.prototype()
     scene = circles((44, 104, 15), (70, 140, 10))
-    solver, problem = Solver(robot, scene), node_problem(robot, scene.kinds)
+    solver, problem = Solver(robot, scene), node_problem(robot, scene.kinds, scene.mounted)
     outputs = [problem.objective, problem.equalities, problem.inequalities]
     evaluate = ca.Function("problem", [problem.unknowns, problem.parameters], outputs)
     equilibrium = solver.rest()
     for cable in pulls(8.0, 0.5):
         equilibrium = solver.step(equilibrium, cable)
         unknowns = np.concatenate([equilibrium.nodes[1:, :2].ravel(), equilibrium.cable_nodes[1:].ravel()])
-        shapes = [v for obstacle in scene for v in obstacle.parameters]
         objective, equalities, gaps = evaluate(
-            unknowns, [equilibrium.cable_mm, robot.length_mm, robot.offset_mm, *shapes]
+            unknowns, [equilibrium.cable_mm, robot.length_mm, robot.offset_mm, robot.rigidity, *scene.parameters]
         )
         assert float(objective) == pytest.approx(equilibrium.objective, rel=1e-10)
         assert np.abs(equalities.full()).max() < 1e-10

@@ -25,8 +25,14 @@ PUSHED = [
 SCENES = [
     *([obstacle] for obstacle in PUSHED),
     [Circle(center=(33, 89), radius=12.5), Circle(center=(59, 140), radius=15)],
+    *([replace(obstacle, stiffness=((0.4, 0.1), (0.1, 0.2)))] for obstacle in PUSHED),
+    [Circle(center=(33, 89), radius=12.5, stiffness=1.0), Circle(center=(59, 140), radius=15)],
 ]
-EVERY_SCENE = pytest.mark.parametrize("obstacles", SCENES, ids=lambda scene: "+".join(o.kind for o in scene))
+EVERY_SCENE = pytest.mark.parametrize(
+    "obstacles",
+    SCENES,
+    ids=lambda scene: "+".join(o.kind + ("" if o.stiffness is None else " on a spring") for o in scene),
+)
 CABLE_MM, STEP = 9.0, 1e-4
 
 
@@ -40,12 +46,24 @@ def solve(robot, obstacles, cable=CABLE_MM, length=180.0):
 
 
 def outputs(equilibrium):
-    parts = equilibrium.nodes, 1e3 * equilibrium.multipliers, equilibrium.tension, force_true(equilibrium)
+    parts = (
+        equilibrium.nodes,
+        1e3 * equilibrium.multipliers,
+        equilibrium.tension,
+        force_true(equilibrium),
+        equilibrium.displacements,
+    )
     return np.concatenate([np.ravel(part) for part in parts])
 
 
 def predicted(slopes, row):
-    parts = slopes.nodes[row], 1e3 * slopes.multipliers[row], slopes.tension[row], slopes.forces[row]
+    parts = (
+        slopes.nodes[row],
+        1e3 * slopes.multipliers[row],
+        slopes.tension[row],
+        slopes.forces[row],
+        slopes.displacements[row],
+    )
     return np.concatenate([np.ravel(part) for part in parts])
 
 
