@@ -17,4 +17,4 @@ def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
 
 if __name__ == "__main__":
     generate("segment_laws", [segment_function(), arc_function()], Path(sys.argv[1]))
-    generate("gap_laws", [gap_function(kind) for kind in GAP_LAWS], Path(sys.argv[1]))
+    generate("gap_laws", [gap_function(law) for law in GAP_LAWS], Path(sys.argv[1]))

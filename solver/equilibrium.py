@@ -170,7 +170,7 @@ class Equilibrium:
         return np.concatenate(unknowns), np.array(parameters)
 
     def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
-        derivatives = node_derivatives(self.robot, self.scene.kinds, self.scene.mounted)(unknowns, parameters)
+        derivatives = node_derivatives(self.robot, self.scene.laws, self.scene.mounted)(unknowns, parameters)
         return [value.full() for value in derivatives]
 
     def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -99,21 +99,29 @@ def _square_distance(point: ca.SX, start: ca.SX, end: ca.SX) -> ca.SX:
 
 
 class GapLaw(NamedTuple):
-    """One kind of obstacle: its gap as a function of (point, shape), and how many numbers its shape has."""
+    """One kind of obstacle.
 
+    Attributes:
+        kind: Its name.
+        gap: The gap as a function of (point, shape), with unit slope on the surface.
+        size: How many numbers its shape has.
+        growth: Those of them that grow as much as the obstacle grows outwards.
+    """
+
+    kind: str
     gap: Callable[[ca.SX, ca.SX], ca.SX]
     size: int
+    growth: tuple[int, ...]
 
 
 TINY = 1e-200  # keeps quotients defined where an edge has no length [mm²]
 POLYGON_CORNERS = 8
-GAP_LAWS = {
-    "circle": GapLaw(circle_gap, 3),
-    "half_plane": GapLaw(half_plane_gap, 3),
-    "ellipse": GapLaw(ellipse_gap, 6),
-    "capsule": GapLaw(capsule_gap, 5),
-    "polygon": GapLaw(polygon_gap, 1 + 2 * POLYGON_CORNERS),
-}
+CIRCLE = GapLaw("circle", circle_gap, 3, (2,))
+HALF_PLANE = GapLaw("half_plane", half_plane_gap, 3, (2,))
+ELLIPSE = GapLaw("ellipse", ellipse_gap, 6, (2, 3))
+CAPSULE = GapLaw("capsule", capsule_gap, 5, (4,))
+POLYGON = GapLaw("polygon", polygon_gap, 1 + 2 * POLYGON_CORNERS, (0,))
+GAP_LAWS = (CIRCLE, HALF_PLANE, ELLIPSE, CAPSULE, POLYGON)
 
 
 def segment_function() -> ca.Function:
@@ -188,14 +196,14 @@ def arc_function() -> ca.Function:
     return ca.Function("ccr_arc", [angle, length, offset], [ca.cse(law)])
 
 
-def gap_function(kind: str) -> ca.Function:
+@lru_cache(maxsize=64)
+def gap_function(law: GapLaw) -> ca.Function:
     """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle."""
-    law = GAP_LAWS[kind]
     point, shape = ca.SX.sym("point", 2), ca.SX.sym("shape", law.size)
     gap = law.gap(point, shape)
     hessian, gradient = ca.hessian(gap, point)
     outputs = ca.vertcat(gap, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1])
-    return ca.Function(f"ccr_{kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
+    return ca.Function(f"ccr_{law.kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
 
 
 class NodeProblem(NamedTuple):
@@ -221,22 +229,27 @@ class NodeProblem(NamedTuple):
     inequalities: ca.MX
 
 
-def node_problem(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool, ...]) -> NodeProblem:
-    """Build eq. 5 (eq. 4 when ``kinds`` is empty) for a robot's segments and points, and the given kinds of obstacle.
+def node_problem(
+    robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...], change: ca.MX | None = None
+) -> NodeProblem:
+    """Build eq. 5 (eq. 4 when there are no obstacles) for a robot's segments and points, and obstacles of given kinds.
 
     The arccosine of eq. 4 is written as an arctangent of the same disk directions, which is smooth at zero.
 
     Args:
         robot: The robot.
-        kinds: Names of the gap laws of the obstacles.
+        laws: Gap laws of the obstacles.
         mounted: Which obstacles are on springs.
+        change: Of (l, L0), then of each obstacle its motion (x, y, turn about the origin, growth), ``(2 + 4m,)``
+            [mm, rad]; ``None`` for none.
     """
     segments = robot.segments
     unknowns = ca.MX.sym("unknowns", 4 * segments + 2 * sum(mounted))
-    starts = parameter_starts(kinds)
+    starts = list(itertools.accumulate((law.size for law in laws), initial=4))
     parameters = ca.MX.sym("parameters", starts[-1] + 3 * sum(mounted))
-    shapes = [parameters[start:end] for start, end in itertools.pairwise(starts)]
     pull, total, offset = parameters[0], parameters[1], parameters[2]
+    if change is not None:
+        pull, total = pull + change[0], total + change[1]
     stiffness = parameters[3] * segments / (2 * total)
     backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(unknowns[: 2 * segments], 2, segments))
     cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments : 4 * segments], 2, segments))
@@ -258,21 +271,26 @@ def node_problem(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool, ..
     displacements = ca.reshape(unknowns[4 * segments :], 2, -1)
     springs = ca.reshape(parameters[starts[-1] :], 3, -1)
     gaps, energy = [], ca.sumsqr(angle)
-    for j, (kind, shape) in enumerate(zip(kinds, shapes, strict=True)):
-        moved = ca.MX.zeros(2)
+    for j, law in enumerate(laws):
+        shape, shift, turn = parameters[starts[j] : starts[j + 1]], ca.MX.zeros(2), ca.MX.eye(2)
+        if change is not None:
+            x, y, angle_turned, growth = ca.vertsplit(change[2 + 4 * j : 6 + 4 * j])
+            shift, turn = ca.vertcat(x, y), _rotation(angle_turned)
+            shape = shape + growth * ca.DM([k in law.growth for k in range(law.size)])
         if mounted[j]:
             mount = sum(mounted[:j])
             moved, (xx, xy, yy) = displacements[:, mount], ca.vertsplit(springs[:, mount])
             energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * stiffness)
+            shift = shift + moved
         for line in robot.touch:
             points = _divided(lines[line], robot.between)[:, 1:]
-            gaps.append(_gaps(kind, points - ca.repmat(moved, 1, points.shape[1]), shape))
+            gaps.append(_gaps(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
     return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(slack, *gaps))
 
 
-def parameter_starts(kinds: tuple[str, ...]) -> list[int]:
-    """Where each obstacle's shape starts in the parameters of :func:`node_problem`, and where the last one ends."""
-    return list(itertools.accumulate((GAP_LAWS[kind].size for kind in kinds), initial=4))
+def _rotation(angle: ca.MX) -> ca.MX:
+    cosine, sine = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
 
 
 def _norms(columns: ca.MX) -> ca.MX:
@@ -285,15 +303,15 @@ def _divided(line: ca.MX, between: int) -> ca.MX:
     return ca.horzcat(ca.reshape(ca.vertcat(*pieces), 2, -1), line[:, -1])
 
 
-def _gaps(kind: str, points: ca.MX, shape: ca.MX) -> ca.MX:
+def _gaps(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
     count = points.shape[1]
-    return gap_function(kind).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
+    return gap_function(law).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
 
 
 @lru_cache(maxsize=32)
-def node_derivatives(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool, ...]) -> ca.Function:
+def node_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of :func:`node_problem`."""
-    problem = node_problem(robot, kinds, mounted)
+    problem = node_problem(robot, laws, mounted)
     outputs = [
         ca.gradient(problem.objective, problem.unknowns),
         problem.equalities,
@@ -304,48 +322,17 @@ def node_derivatives(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool
     return ca.Function("node_derivatives", [problem.unknowns, problem.parameters], outputs)
 
 
-def moved_shape(kind: str, shape: ca.MX, motion: ca.MX) -> ca.MX:
-    """A shape turned about the origin, shifted and grown by ``motion = (x, y, turn, radius)`` [mm, mm, rad, mm]."""
-    cosine, sine = ca.cos(motion[2]), ca.sin(motion[2])
-    turn = ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
-
-    def place(points: ca.MX) -> ca.MX:
-        columns = ca.reshape(points, 2, -1)
-        return ca.vec(turn @ columns + ca.repmat(motion[:2], 1, columns.shape[1]))
-
-    match kind:
-        case "circle":
-            return ca.vertcat(place(shape[:2]), shape[2] + motion[3])
-        case "half_plane":
-            normal = turn @ shape[:2]
-            return ca.vertcat(normal, shape[2] + ca.dot(normal, motion[:2]) + motion[3])
-        case "ellipse":
-            return ca.vertcat(place(shape[:2]), shape[2:4] + motion[3], turn @ shape[4:])
-        case "capsule":
-            return ca.vertcat(place(shape[:4]), shape[4] + motion[3])
-        case "polygon":
-            return ca.vertcat(shape[0] + motion[3], place(shape[1:]))
-    raise ValueError(f"kind is {kind!r}; it must be one of {', '.join(GAP_LAWS)}")
-
-
 @lru_cache(maxsize=32)
-def kkt_derivatives(robot: "Robot", kinds: tuple[str, ...], mounted: tuple[bool, ...]) -> ca.Function:
+def kkt_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Derivatives of the optimality conditions of :func:`node_problem`.
 
     With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian
     ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities, inequalities)`` and loads ``L_v``:
     ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the multipliers stands in ``F_v`` already.
     """
-    problem = node_problem(robot, kinds, mounted)
-    change = ca.MX.sym("change", 2 + 4 * len(kinds))
-    starts, parameters = parameter_starts(kinds), problem.parameters
-    shapes = [
-        moved_shape(kind, parameters[start:end], change[2 + 4 * j : 6 + 4 * j])
-        for j, (kind, (start, end)) in enumerate(zip(kinds, itertools.pairwise(starts), strict=True))
-    ]
-    changed = ca.vertcat(parameters[:2] + change[:2], parameters[2:4], *shapes, parameters[starts[-1] :])
-    terms = ca.Function("terms", [problem.unknowns, problem.parameters], problem[2:])
-    objective, equalities, inequalities = terms(problem.unknowns, changed)
+    change = ca.MX.sym("change", 2 + 4 * len(laws))
+    problem = node_problem(robot, laws, mounted, change)
+    _, _, objective, equalities, inequalities = problem
     tensions, pushes = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("pushes", inequalities.shape[0])
     lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(pushes, inequalities)
     loads = ca.gradient(lagrangian, change)

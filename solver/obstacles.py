@@ -9,13 +9,13 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from solver import _kernel
-from solver.formulation import GAP_LAWS, POLYGON_CORNERS
+from solver.formulation import CAPSULE, CIRCLE, ELLIPSE, GAP_LAWS, HALF_PLANE, POLYGON, POLYGON_CORNERS, GapLaw
 from solver.robot import require_positive
 
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
 
-SHAPES = {kind: index for index, kind in enumerate(GAP_LAWS)}  # as ccr::Shape in native/obstacle.hpp
+SHAPES = {law.kind: index for index, law in enumerate(GAP_LAWS)}  # as ccr::Shape in native/obstacle.hpp
 
 
 class Extent(NamedTuple):
@@ -47,7 +47,7 @@ class Obstacle(ABC):
         ValueError: If a node index is negative or repeated, or the stiffness is not positive definite.
     """
 
-    kind: ClassVar[str]
+    law: ClassVar[GapLaw]
 
     nodes: tuple[int, ...] | None = None
     stiffness: float | Matrix | None = None
@@ -60,6 +60,11 @@ class Obstacle(ABC):
             if not nodes or min(nodes) < 0 or len(set(nodes)) != len(nodes):
                 raise ValueError(f"nodes is {self.nodes}; it must name at least one node, each once, from 0")
             object.__setattr__(self, "nodes", nodes)
+
+    @property
+    def kind(self) -> str:
+        """Name of its gap law."""
+        return self.law.kind
 
     @property
     def stiffness_matrix(self) -> np.ndarray:
@@ -125,7 +130,7 @@ class Circle(Obstacle):
         ValueError: If a value is not finite or the radius is not positive.
     """
 
-    kind: ClassVar[str] = "circle"
+    law: ClassVar[GapLaw] = CIRCLE
 
     center: Pair
     radius: float
@@ -166,7 +171,7 @@ class HalfPlane(Obstacle):
         ValueError: If a value is not finite, the normal vanishes, or a node index is negative or repeated.
     """
 
-    kind: ClassVar[str] = "half_plane"
+    law: ClassVar[GapLaw] = HALF_PLANE
 
     point: Pair
     normal: Pair
@@ -208,7 +213,7 @@ class Ellipse(Obstacle):
         ValueError: If a value is not finite, a half-axis not positive, or the axis vanishes.
     """
 
-    kind: ClassVar[str] = "ellipse"
+    law: ClassVar[GapLaw] = ELLIPSE
 
     center: Pair
     radii: Pair
@@ -256,7 +261,7 @@ class Capsule(Obstacle):
         ValueError: If a value is not finite, the radius is not positive, or the ends coincide.
     """
 
-    kind: ClassVar[str] = "capsule"
+    law: ClassVar[GapLaw] = CAPSULE
 
     start: Pair
     end: Pair
@@ -303,7 +308,7 @@ class Polygon(Obstacle):
             those of a convex polygon.
     """
 
-    kind: ClassVar[str] = "polygon"
+    law: ClassVar[GapLaw] = POLYGON
 
     corners: tuple[Pair, ...]
     radius: float

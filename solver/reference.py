@@ -137,7 +137,7 @@ class ReferenceSolver:
 
     def _build(self) -> None:
         n = self.robot.segments
-        problem = node_problem(self.robot, self.scene.kinds, self.scene.mounted)
+        problem = node_problem(self.robot, self.scene.laws, self.scene.mounted)
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
         # In units of the free robot's segment angle, so that the tolerances mean the same at every displacement;
         # with a sliding cable a robot bends without any, too.
@@ -193,7 +193,7 @@ class ReferenceSolver:
 
     def _balanced(self, cable: float, length: float, unknowns: np.ndarray, pushes: np.ndarray) -> _Point:
         """A shape with multipliers of its inequalities, and those of the equalities by least squares."""
-        derivatives = node_derivatives(self.robot, self.scene.kinds, self.scene.mounted)
+        derivatives = node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
         values = derivatives(unknowns, self._parameters(cable, length))
         slope, _, equality_slopes, _, gap_slopes = (value.full() for value in values)
         balance = gap_slopes.T @ pushes - slope.ravel()

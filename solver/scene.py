@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.formulation import GapLaw
 from solver.obstacles import Obstacle
 
 MAX_OBSTACLES = 32
@@ -53,6 +54,6 @@ class Scene:
         return (*shapes, *np.ravel(springs).tolist())
 
     @property
-    def kinds(self) -> tuple[str, ...]:
-        """Names of the gap laws, in order."""
-        return tuple(obstacle.kind for obstacle in self.obstacles)
+    def laws(self) -> tuple[GapLaw, ...]:
+        """The gap laws, in order."""
+        return tuple(obstacle.law for obstacle in self.obstacles)

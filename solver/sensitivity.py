@@ -101,7 +101,7 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
 
 def _derivatives(equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """``F_z, F_v, L_v, L_vv`` of :func:`solver.formulation.kkt_derivatives` at an equilibrium."""
-    function = kkt_derivatives(equilibrium.robot, equilibrium.scene.kinds, equilibrium.scene.mounted)
+    function = kkt_derivatives(equilibrium.robot, equilibrium.scene.laws, equilibrium.scene.mounted)
     values = function(*equilibrium.node_solution())
     conditions, varied, loads, load_slopes = (value.full() for value in values)
     return conditions, varied, loads.ravel(), load_slopes

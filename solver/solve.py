@@ -43,7 +43,7 @@ class Solver:
             robot.lengths_mm[1],
             list(robot.lines_mm),
             robot.between,
-            [SHAPES[kind] for kind in scene.kinds],
+            [SHAPES[obstacle.kind] for obstacle in scene],
             np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
             np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
             touchable.reshape(len(scene), len(robot.touch) * robot.positions),

@@ -54,7 +54,7 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(cable, scene):
     robot, n = equilibrium.robot, equilibrium.robot.segments
     unknowns, parameters, _, _ = equilibrium.node_solution()
     slope, _, held, _, gaps = (
-        v.full() for v in node_derivatives(robot, scene.kinds, scene.mounted)(unknowns, parameters)
+        v.full() for v in node_derivatives(robot, scene.laws, scene.mounted)(unknowns, parameters)
     )
     # Admissible: backbone and disks keep their lengths; the cable shortens, by 1/n in each segment or as a whole.
     shortening = np.zeros(3 * n)

@@ -84,13 +84,13 @@ def test_arc(angle):
 
 
 def test_every_law_has_an_obstacle():
-    assert [obstacle.kind for obstacle in OBSTACLES] == list(GAP_LAWS)
+    assert tuple(obstacle.law for obstacle in OBSTACLES) == GAP_LAWS
 
 
 @EVERY_OBSTACLE
 @pytest.mark.parametrize("point", [(33.0, 91.0), (41.0, 91.5), (57.0, 104.0), (43.0, 97.0)])
 def test_gap_derivatives(obstacle, point):
-    function = gap_function(obstacle.kind)
+    function = gap_function(obstacle.law)
     law = lambda p: function(p, obstacle.parameters).full().ravel()  # noqa: E731
     value = law(point)
     assert obstacle.gap(np.array(point)) == pytest.approx(value[0], abs=1e-13)
@@ -129,7 +129,7 @@ def test_shifted_obstacle(obstacle):
 def test_node_problem_at_a_solution(circles, pulls):
     robot = Robot.prototype()
     scene = circles((44, 104, 15), (70, 140, 10))
-    solver, problem = Solver(robot, scene), node_problem(robot, scene.kinds, scene.mounted)
+    solver, problem = Solver(robot, scene), node_problem(robot, scene.laws, scene.mounted)
     outputs = [problem.objective, problem.equalities, problem.inequalities]
     evaluate = ca.Function("problem", [problem.unknowns, problem.parameters], outputs)
     equilibrium = solver.rest()
