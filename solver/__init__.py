@@ -1,5 +1,6 @@
 """Exact optimisation kinematics of a cable-driven continuum robot among obstacles."""
 
+from solver.custom import Custom, Family
 from solver.equilibrium import Equilibrium, Residuals
 from solver.obstacles import Capsule, Circle, Ellipse, HalfPlane, Obstacle, Polygon
 from solver.reference import ReferenceSolver
@@ -11,8 +12,10 @@ from solver.status import Status
 __all__ = [
     "Capsule",
     "Circle",
+    "Custom",
     "Ellipse",
     "Equilibrium",
+    "Family",
     "HalfPlane",
     "Obstacle",
     "Polygon",

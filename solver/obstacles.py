@@ -15,7 +15,9 @@ from solver.robot import require_positive
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
 
-SHAPES = {law.kind: index for index, law in enumerate(GAP_LAWS)}  # as ccr::Shape in native/obstacle.hpp
+SHAPES = {
+    kind: index for index, kind in enumerate([*(law.kind for law in GAP_LAWS), "custom"])
+}  # as ccr::Shape in native/obstacle.hpp
 
 
 class Extent(NamedTuple):
@@ -47,8 +49,6 @@ class Obstacle(ABC):
         ValueError: If a node index is negative or repeated, or the stiffness is not positive definite.
     """
 
-    law: ClassVar[GapLaw]
-
     nodes: tuple[int, ...] | None = None
     stiffness: float | Matrix | None = None
 
@@ -60,6 +60,11 @@ class Obstacle(ABC):
             if not nodes or min(nodes) < 0 or len(set(nodes)) != len(nodes):
                 raise ValueError(f"nodes is {self.nodes}; it must name at least one node, each once, from 0")
             object.__setattr__(self, "nodes", nodes)
+
+    @property
+    @abstractmethod
+    def law(self) -> GapLaw:
+        """The law of its gap."""
 
     @property
     def kind(self) -> str:
@@ -137,7 +142,7 @@ class Circle(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "center", _pair("center", self.center))
+        object.__setattr__(self, "center", pair("center", self.center))
         require_positive("radius", self.radius)
 
     @property
@@ -152,11 +157,11 @@ class Circle(Obstacle):
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The circle elsewhere."""
-        return replace(self, center=_plus(self.center, by))
+        return replace(self, center=plus(self.center, by))
 
     def outline(self) -> np.ndarray:
         """Points of the circle, ``(k, 2)`` [mm]."""
-        return np.array(self.center) + self.radius * _directions()
+        return np.array(self.center) + self.radius * directions()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,8 +183,8 @@ class HalfPlane(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "point", _pair("point", self.point))
-        object.__setattr__(self, "normal", _unit("normal", self.normal, "from the wall towards the robot"))
+        object.__setattr__(self, "point", pair("point", self.point))
+        object.__setattr__(self, "normal", unit("normal", self.normal, "from the wall towards the robot"))
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -193,7 +198,7 @@ class HalfPlane(Obstacle):
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The wall elsewhere."""
-        return replace(self, point=_plus(self.point, by))
+        return replace(self, point=plus(self.point, by))
 
     def outline(self) -> np.ndarray:
         """The point of the surface, ``(1, 2)`` [mm]."""
@@ -221,9 +226,9 @@ class Ellipse(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "center", _pair("center", self.center))
-        object.__setattr__(self, "radii", _pair("radii", self.radii))
-        object.__setattr__(self, "axis", _unit("axis", self.axis, "of the first half-axis"))
+        object.__setattr__(self, "center", pair("center", self.center))
+        object.__setattr__(self, "radii", pair("radii", self.radii))
+        object.__setattr__(self, "axis", unit("axis", self.axis, "of the first half-axis"))
         for radius in self.radii:
             require_positive("a half-axis of radii", radius)
 
@@ -240,12 +245,12 @@ class Ellipse(Obstacle):
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The ellipse elsewhere."""
-        return replace(self, center=_plus(self.center, by))
+        return replace(self, center=plus(self.center, by))
 
     def outline(self) -> np.ndarray:
         """Points of the ellipse, ``(k, 2)`` [mm]."""
         x, y = self.axis
-        return np.asarray(self.center + _directions() * self.radii @ np.array([[x, y], [-y, x]]))
+        return np.asarray(self.center + directions() * self.radii @ np.array([[x, y], [-y, x]]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -269,8 +274,8 @@ class Capsule(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "start", _pair("start", self.start))
-        object.__setattr__(self, "end", _pair("end", self.end))
+        object.__setattr__(self, "start", pair("start", self.start))
+        object.__setattr__(self, "end", pair("end", self.end))
         require_positive("radius", self.radius)
         if self.start == self.end:
             raise ValueError(f"start and end are both {self.start}; they must differ (a Circle has one centre)")
@@ -288,7 +293,7 @@ class Capsule(Obstacle):
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The capsule elsewhere."""
-        return replace(self, start=_plus(self.start, by), end=_plus(self.end, by))
+        return replace(self, start=plus(self.start, by), end=plus(self.end, by))
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
@@ -315,7 +320,7 @@ class Polygon(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        corners = tuple(_pair("a corner", corner) for corner in self.corners)
+        corners = tuple(pair("a corner", corner) for corner in self.corners)
         if not 3 <= len(corners) <= POLYGON_CORNERS:
             raise ValueError(f"corners has {len(corners)} points; it must have 3 to {POLYGON_CORNERS}")
         turns = _turns(corners)
@@ -341,14 +346,19 @@ class Polygon(Obstacle):
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The polygon elsewhere."""
-        return replace(self, corners=tuple(_plus(corner, by) for corner in self.corners))
+        return replace(self, corners=tuple(plus(corner, by) for corner in self.corners))
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
         return _rounded(np.array(self.corners), self.radius)
 
 
-def _pair(name: str, value: Iterable[float]) -> Pair:
+def pair(name: str, value: Iterable[float]) -> Pair:
+    """Two finite numbers.
+
+    Raises:
+        ValueError: Naming what they are.
+    """
     try:
         x, y = (float(v) for v in value)
     except (TypeError, ValueError) as error:
@@ -358,7 +368,8 @@ def _pair(name: str, value: Iterable[float]) -> Pair:
     return x, y
 
 
-def _plus(point: Pair, by: Iterable[float]) -> Pair:
+def plus(point: Pair, by: Iterable[float]) -> Pair:
+    """A point moved by a shift."""
     x, y = by
     return point[0] + float(x), point[1] + float(y)
 
@@ -376,8 +387,13 @@ def _stiffness(value: float | Matrix) -> Matrix:
     return (xx, xy), (xy, yy)
 
 
-def _unit(name: str, value: Iterable[float], meaning: str) -> Pair:
-    x, y = _pair(name, value)
+def unit(name: str, value: Iterable[float], meaning: str) -> Pair:
+    """A direction, normalised.
+
+    Raises:
+        ValueError: If it has none, naming what it is for.
+    """
+    x, y = pair(name, value)
     size = math.hypot(x, y)
     if size == 0:
         raise ValueError(f"{name} is (0, 0); give the direction {meaning}")
@@ -398,12 +414,13 @@ def _width(corners: np.ndarray) -> float:
     return float(((inward @ corners.T).max(axis=1) - (inward * corners).sum(axis=1)).min())
 
 
-def _directions() -> np.ndarray:
+def directions() -> np.ndarray:
+    """Unit vectors once round, ``(96, 2)``."""
     angles = np.linspace(0, 2 * np.pi, 97)[:-1]
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 def _rounded(core: np.ndarray, radius: float) -> np.ndarray:
     """Outline of everything within a radius of the polygon or line through some points, ``(k, 2)``."""
-    directions = _directions()
-    return np.asarray(core[(directions @ core.T).argmax(axis=1)] + radius * directions)
+    around = directions()
+    return np.asarray(core[(around @ core.T).argmax(axis=1)] + radius * around)

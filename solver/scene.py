@@ -32,7 +32,7 @@ class Scene:
         for obstacle in self.obstacles:
             if not isinstance(obstacle, Obstacle):
                 raise TypeError(
-                    f"{obstacle!r} is not an obstacle; give a Circle, HalfPlane, Ellipse, Capsule or Polygon"
+                    f"{obstacle!r} is not an obstacle; give a Circle, HalfPlane, Ellipse, Capsule, Polygon or Custom"
                 )
 
     def __len__(self) -> int:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from solver._kernel import SHAPE_SIZE, Kernel
+from solver.compile import law_address
 from solver.equilibrium import Equilibrium
 from solver.geometry import touchable_points
 from solver.obstacles import SHAPES
@@ -26,6 +27,7 @@ class Solver:
     Raises:
         ValueError: If an obstacle overlaps the straight robot, is narrow enough to slip between its points, or names a
             node the robot does not have.
+        RuntimeError: If a :class:`~solver.custom.Custom` shape cannot be compiled.
     """
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
@@ -48,6 +50,7 @@ class Solver:
             np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
             touchable.reshape(len(scene), len(robot.touch) * robot.positions),
             np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
+            [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
         )
         straight = np.zeros(self._kernel.block_size)
         straight[1] = robot.length_mm

@@ -1,5 +1,13 @@
+import os
+
 import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--soak", type=int, default=10_000, help="steps of the random soak of the solver")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keeps what tests compile out of the user's cache."""
+    os.environ["CCR_GYM_CACHE"] = str(tmp_path_factory.mktemp("cache"))

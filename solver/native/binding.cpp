@@ -4,6 +4,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <stdexcept>
 #include <tuple>
@@ -19,13 +20,14 @@ using Input = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 using Output = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
 using Mask = nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Kinds = std::vector<int>;
+using Addresses = std::vector<std::uintptr_t>;
 
 std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& parameters, const Input& extents,
-                                          const Mask& touchable, const Input& stiffness) {
+                                          const Mask& touchable, const Input& stiffness, const Addresses& laws) {
   const std::size_t count = kinds.size(), points = touchable.shape(1);
   if (parameters.size() != ccr::kShapeSize * count || extents.size() != 4 * count || touchable.shape(0) != count ||
-      stiffness.size() != 4 * count)
-    throw std::invalid_argument("one row of parameters, extents, touchable points and stiffness per obstacle");
+      stiffness.size() != 4 * count || laws.size() != count)
+    throw std::invalid_argument("one row of parameters, extents, touchable points, stiffness and law per obstacle");
   std::vector<ccr::Obstacle> obstacles(count);
   for (std::size_t i = 0; i < count; ++i) {
     ccr::Obstacle& obstacle = obstacles[i];
@@ -36,6 +38,7 @@ std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& param
     obstacle.radius = extent[2];
     obstacle.fineness = extent[3];
     std::copy_n(stiffness.data() + 4 * i, 4, obstacle.stiffness.v.begin());
+    obstacle.law = reinterpret_cast<ccr::Law>(laws[i]);
     obstacle.mounted = obstacle.stiffness(0, 0) > 0;
     obstacle.touchable.assign(touchable.data() + points * i, touchable.data() + points * (i + 1));
   }
@@ -60,9 +63,9 @@ class Kernel {
  public:
   Kernel(bool sliding, int segments, double offset, double rigidity, double max_tension, double max_length,
          const std::vector<double>& lines, int between, const Kinds& kinds, const Input& parameters,
-         const Input& extents, const Mask& touchable, const Input& stiffness) {
+         const Input& extents, const Mask& touchable, const Input& stiffness, const Addresses& laws) {
     const ccr::Robot robot{segments, offset, rigidity, max_tension, max_length, lines, between};
-    const auto obstacles = read_obstacles(kinds, parameters, extents, touchable, stiffness);
+    const auto obstacles = read_obstacles(kinds, parameters, extents, touchable, stiffness, laws);
     if (sliding)
       branch_ = std::make_unique<ccr::Branch<ccr::SlidingCable>>(robot, obstacles);
     else
@@ -104,9 +107,9 @@ NB_MODULE(_kernel, m) {
         "Write value, x and y slope of the gap of each point to one obstacle.");
   nb::class_<Kernel>(m, "Kernel", "Solver of one robot in one scene; holds scratch memory and no state between calls.")
       .def(nb::init<bool, int, double, double, double, double, const std::vector<double>&, int, const Kinds&,
-                    const Input&, const Input&, const Mask&, const Input&>(),
+                    const Input&, const Input&, const Mask&, const Input&, const Addresses&>(),
            "sliding"_a, "segments"_a, "offset"_a, "rigidity"_a, "max_tension"_a, "max_length"_a, "lines"_a,
-           "between"_a, "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "stiffness"_a)
+           "between"_a, "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "stiffness"_a, "laws"_a)
       .def_prop_ro("block_size", &Kernel::block_size, "Length of an equilibrium's block.")
       .def("step", &Kernel::step, "from_"_a, "cable"_a, "length"_a, "to"_a,
            "Follow the branch from one block to a cable displacement and length into another; returns (status, iterations).")

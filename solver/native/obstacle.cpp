@@ -23,6 +23,7 @@ void with_law(const Obstacle& obstacle, Function function) {
     case Shape::kEllipse: return function(ccr_ellipse_gap);
     case Shape::kCapsule: return function(ccr_capsule_gap);
     case Shape::kPolygon: return function(ccr_polygon_gap);
+    case Shape::kCustom: return function(obstacle.law);
   }
 }
 

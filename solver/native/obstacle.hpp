@@ -11,13 +11,17 @@ namespace ccr {
 
 using Position = Vec<2>;
 
-enum class Shape { kCircle, kHalfPlane, kEllipse, kCapsule, kPolygon };  // in the order of GAP_LAWS
+enum class Shape { kCircle, kHalfPlane, kEllipse, kCapsule, kPolygon, kCustom };  // in the order of SHAPES
+
+// A compiled gap law: (point, parameters) to a Gap.
+using Law = int (*)(const double** in, double** out, int*, double*, int);
 
 inline constexpr int kShapeSize = 17;  // numbers of the largest shape
 
 struct Obstacle {
   Shape shape;
   std::array<double, kShapeSize> parameters;  // as the gap law takes them
+  Law law;                               // of a custom shape
   Position center;                       // of a disc that holds it
   double radius;                         // of that disc; infinite for a half-plane
   double fineness;                       // smallest radius of its surface; infinite for a half-plane

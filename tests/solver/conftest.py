@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Capsule, Circle, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene, free
+from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Obstacle, Polygon, Robot, Scene, free
 
 
 def make_circles(*circles: tuple[float, float, float]) -> Scene:
@@ -58,6 +58,9 @@ def clearance(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
     return np.min([obstacle.gap(points) for obstacle in scene if obstacle.nodes is None], axis=(0, 2))
 
 
+OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
+
+
 def random_spring(generator: np.random.Generator) -> float | None:
     """None for half of the obstacles, from very soft to very stiff for the others [N/mm]."""
     return 10 ** generator.uniform(-2.5, 1.5) if generator.random() < 0.5 else None
@@ -68,7 +71,7 @@ def random_shape(generator: np.random.Generator, thinnest: float) -> Obstacle:
     x, y = generator.uniform((40, 75), (75, 150))
     axis, across, along = generator.normal(size=2), generator.uniform(thinnest, 12), generator.uniform(thinnest, 20)
     axis /= np.linalg.norm(axis)
-    match generator.integers(5):
+    match generator.integers(6):
         case 0:
             return Circle(center=(x, y), radius=across)
         case 1:
@@ -80,6 +83,10 @@ def random_shape(generator: np.random.Generator, thinnest: float) -> Obstacle:
             angles = 2 * np.pi / count * (np.arange(count) + generator.uniform(0, 0.4, count))
             ring = (x, y) + 12 * np.column_stack([np.cos(angles), np.sin(angles)])
             return Polygon(corners=tuple(map(tuple, ring)), radius=generator.uniform(1, 5))
+        case 4:
+            return Custom(
+                family=OVAL, sizes=(across + 2, along), center=(x, y), axis=tuple(axis), reach=1.2 * (across + along)
+            )
         case _:
             return HalfPlane(point=(x, y), normal=(-1, generator.uniform(-1, 1)))
 

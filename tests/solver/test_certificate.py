@@ -54,7 +54,7 @@ def test_residuals_of_every_shape(random_shapes, cable, touch):
         states = list(follow(Solver(robot, scene), np.column_stack([changes, np.zeros(40)])))
         certify(states)
         touched |= {scene.laws[j] for state in states for j in state.contact.any(axis=(1, 2)).nonzero()[0]}
-    assert touched == set(GAP_LAWS)
+    assert touched > set(GAP_LAWS)  # and a custom shape
     assert springs > 10
 
 

@@ -1,0 +1,70 @@
+"""Gap laws compiled at run time, for obstacles whose shape is a CasADi expression."""
+
+import ctypes
+import functools
+import os
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import casadi as ca
+
+from solver.artefacts import ArtefactStore, artefact_key
+from solver.formulation import GapLaw, gap_function
+
+COMPILERS = ["cc", "gcc", "clang", "c++"]
+FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
+
+
+@functools.cache
+def store() -> ArtefactStore:
+    """Where compiled laws are kept."""
+    return ArtefactStore()
+
+
+@functools.cache
+def law_address(law: GapLaw) -> int:
+    """Address of a compiled gap law, ``int law(const double**, double**, int*, double*, int)``, valid for good.
+
+    Raises:
+        RuntimeError: If there is no C compiler, or it fails.
+    """
+    source = _source(gap_function(law))
+    compiler = _compiler()
+    version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
+    key = artefact_key(source, ca.CasadiMeta.version(), shlex.join(compiler), version, " ".join(FLAGS))
+    library = ctypes.CDLL(str(store().path(key, lambda path: _compile(compiler, source, path), ".so")))
+    _LIBRARIES.append(library)
+    address = ctypes.cast(getattr(library, f"ccr_{law.kind}_gap"), ctypes.c_void_p).value
+    assert address is not None
+    return address
+
+
+_LIBRARIES: list[ctypes.CDLL] = []  # stay loaded
+
+
+def _source(function: ca.Function) -> str:
+    generator = ca.CodeGenerator("law", {"casadi_int": "int"})
+    generator.add(function)
+    return str(generator.dump())
+
+
+def _compiler() -> list[str]:
+    candidates = [os.environ["CC"]] if "CC" in os.environ else COMPILERS
+    for command in map(shlex.split, candidates):
+        if shutil.which(command[0]):
+            return command
+    raise RuntimeError(
+        f"{' or '.join(candidates)} is not there, and a shape given as an expression is compiled for the solver; "
+        "install a C compiler or set CC to one, or use ReferenceSolver, which needs none"
+    )
+
+
+def _compile(compiler: list[str], source: str, path: Path) -> None:
+    written = path.with_suffix(".c")
+    written.write_text(source)
+    command = [*compiler, *FLAGS, str(written), "-o", str(path), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{shlex.join(command)} failed:\n{done.stderr}")

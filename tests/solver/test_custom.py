@@ -1,0 +1,131 @@
+"""Shapes given as expressions: a custom ellipse is the ellipse, and a new shape is as exact as any."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Custom, Ellipse, Family, ReferenceSolver, Robot, Scene, Solver, Status
+from solver.compile import store
+from solver.robot import CABLES
+
+ELLIPSE = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
+EGG = Family.trace(lambda point, sizes: (point[0] ** 2 + point[1] ** 2 + sizes[0] * point[0]) ** 2 - sizes[1] ** 4, 2)
+PLACE = {"center": (44, 104), "axis": (1, 2)}
+EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+
+
+def egg(**changes):
+    return Custom(**{"family": EGG, "sizes": (6, 12), "center": (44, 104), "axis": (1, 2), "reach": 20, **changes})
+
+
+def pulled(robot, obstacle, solver=Solver):
+    equilibrium = solver(robot, Scene([obstacle])).rest()
+    solver = solver(robot, Scene([obstacle]))
+    for cable in np.arange(0.25, 9.01, 0.25):
+        equilibrium = solver.step(equilibrium, cable)
+        yield equilibrium
+
+
+def test_a_custom_ellipse_is_the_ellipse():
+    custom = Custom(family=ELLIPSE, sizes=(15, 9), reach=16, **PLACE)
+    ellipse = Ellipse(radii=(15, 9), **PLACE)
+    points = np.array([[(30.0, 80.0), (50.0, 120.0)], [(44.0, 115.0), (60.0, 90.0)]])
+    assert custom.gap(points) == pytest.approx(ellipse.gap(points), abs=1e-12)
+    assert custom.normal_at(points) == pytest.approx(ellipse.normal_at(points), abs=1e-12)
+    assert custom.extent.width == pytest.approx(ellipse.extent.width, rel=1e-3)
+    assert custom.extent.fineness == pytest.approx(ellipse.extent.fineness, rel=1e-2)
+    for ours, theirs in zip(pulled(Robot.prototype(), custom), pulled(Robot.prototype(), ellipse), strict=True):
+        assert ours.nodes == pytest.approx(theirs.nodes, abs=1e-9)
+        assert ours.multipliers == pytest.approx(theirs.multipliers, abs=1e-12)
+
+
+@EVERY_CABLE
+@pytest.mark.parametrize("stiffness", [None, 0.5])
+def test_certificate(cable, stiffness):
+    states = list(pulled(replace(Robot.prototype(), cable=cable), egg(stiffness=stiffness)))
+    assert states[-1].contact.any()
+    for state in states:
+        assert state.status is Status.CONVERGED
+        assert max(state.residuals()) < 1e-9
+
+
+def test_the_reference_solver_needs_no_compiler(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    shape = egg(family=Family.trace(lambda point, _: point[0] ** 2 + 2 * point[1] ** 2 - 200), sizes=())
+    reference = list(pulled(Robot.prototype(), shape, ReferenceSolver))[-1]
+    assert reference.status is Status.CONVERGED
+    with pytest.raises(RuntimeError, match="no-such-compiler is not there"):
+        Solver(Robot.prototype(), Scene([shape]))
+    monkeypatch.undo()
+    assert list(pulled(Robot.prototype(), shape))[-1].nodes == pytest.approx(reference.nodes, abs=1e-6)
+
+
+def test_a_compiler_that_fails_is_named(monkeypatch):
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(RuntimeError, match=r"false .* failed"):
+        Solver(
+            Robot.prototype(),
+            Scene([egg(family=Family.trace(lambda point, _: point[0] ** 2 + point[1] ** 2 - 90), sizes=())]),
+        )
+
+
+def test_outline():
+    shape = egg()
+    outline = shape.outline()
+    assert shape.gap(outline) == pytest.approx(0, abs=1e-10)
+    assert np.linalg.norm(shape.normal_at(outline), axis=-1) == pytest.approx(1, abs=1e-10)
+    assert shape.shifted((3, -2)).outline() == pytest.approx(outline + np.array([3, -2]), abs=1e-10)
+
+
+SOLVE = """
+from solver import Custom, Family, Robot, Scene, Solver
+family = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
+shape = Custom(family=family, sizes=(14, 9), center=(44, 104), reach=16)
+solver = Solver(Robot.prototype(), Scene([shape]))
+print(solver.step(solver.rest(), 8.0).tension.hex())
+"""
+
+
+def solve(folder):
+    command = [sys.executable, "-c", SOLVE]
+    return subprocess.run(
+        command, env={"CCR_GYM_CACHE": str(folder), "PATH": "/usr/bin:/bin"}, capture_output=True, text=True, check=True
+    ).stdout
+
+
+@pytest.mark.parametrize("damage", [b"", b"not a library", None])
+def test_a_damaged_library_is_rebuilt(tmp_path, damage):
+    before = solve(tmp_path)
+    (library,) = tmp_path.glob("*.so")
+    library.write_bytes(library.read_bytes()[:5000] if damage is None else damage)
+    assert solve(tmp_path) == before
+    (rebuilt,) = tmp_path.glob("*.so")
+    assert rebuilt.read_bytes()[:4] == b"\x7fELF"
+
+
+def test_families_of_one_expression_share_a_library():
+    again = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
+    assert again == ELLIPSE
+    Solver(Robot.prototype(), Scene([Custom(family=ELLIPSE, sizes=(15, 9), reach=16, **PLACE)]))
+    built = store().statistics.builds
+    Solver(Robot.prototype(), Scene([Custom(family=again, sizes=(11, 10), reach=16, **PLACE)]))
+    assert store().statistics.builds == built
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"sizes": (6,)}, r"sizes is \(6.0,\); its family takes 2 numbers"),
+        ({"reach": 8}, "reach is 8; the shape does not end within it"),
+        ({"reach": -1}, "reach is -1; it must be positive"),
+        ({"sizes": (6, 0)}, "is not negative at its centre"),
+        ({"axis": (0, 0)}, r"axis is \(0, 0\)"),
+        ({"center": (0, np.nan)}, "center is .*nan.*; it must be finite"),
+    ],
+)
+def test_bad_shapes_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        egg(**change)
