@@ -18,6 +18,7 @@ MEASURED = {
     51: (3.0, 7.0, 10.0, 14.0, 17.0, 21.0, 24.0),
 }
 THEORETICAL = (3.5, 7.1, 10.7, 14.2, 17.8, 21.3, 24.9)
+FIG_10B_NODES = (10, 12, 14, 16, 18)  # disks that touch; the figure's numbers are not printed
 CALIBRATION = (31, 250)  # distance [mm] and load [g] of the point that μ is found from
 CLAIMED_MEAN_ERROR, CLAIMED_MAX_ERROR = 0.9, 0.5  # [g]
 

@@ -126,8 +126,8 @@ def _seconds(scene: Scene) -> float:
 
 
 def draw(path: Path) -> None:
-    """Fig. 3b, 4a, 4b, 5, 7, 9, 10a and Table 1 on one page."""
-    figure, axes = plt.subplots(2, 4, figsize=(17, 8.5), layout="constrained")
+    """Fig. 3b, 4a, 4b, 5, 7, 9, 10a, 10b and Table 1 on one page."""
+    figure, axes = plt.subplots(3, 3, figsize=(14, 13), layout="constrained")
     for cable in (2.0, 5.0, 8.0, 12.0):
         draw_shape(axes[0, 0], pulled(Scene(), cable))
     axes[0, 0].set_title("Fig. 3b: free profiles, l = 2, 5, 8, 12 mm")
@@ -135,12 +135,13 @@ def draw(path: Path) -> None:
         cable = 8.0 if scene is paper.FIG_4A else 5.0
         draw_shape(axis, pulled(scene, cable))
         axis.set_title(f"{name}: l = {cable:.0f} mm")
-    _draw_multipliers(axes[0, 3])
-    _draw_tip(axes[1, 0])
-    draw_shape(axes[1, 1], pulled(paper.load_cell(26.0), 5.0))
-    axes[1, 1].set_title("Fig. 9: load cell at 26 mm, l = 5 mm")
-    _draw_forces(axes[1, 2])
-    _draw_errors(axes[1, 3])
+    _draw_multipliers(axes[1, 0])
+    _draw_tip(axes[1, 1])
+    draw_shape(axes[1, 2], pulled(paper.load_cell(26.0), 5.0))
+    axes[1, 2].set_title("Fig. 9: load cell at 26 mm, l = 5 mm")
+    _draw_forces(axes[2, 0])
+    _draw_contact_points(axes[2, 1])
+    _draw_errors(axes[2, 2])
     figure.savefig(path, dpi=120)
     plt.close(figure)
 
@@ -171,6 +172,18 @@ def _draw_forces(axis: Axes) -> None:
         axis.plot(paper.LOADS, measured, "o", ms=4, label=f"measured, d = {distance} mm")
     axis.plot(paper.LOADS, table_1(*calibrated()), "k-", label="eq. 11")
     axis.set(title="Fig. 10, Table 1: contact force", xlabel="cable load [g]", ylabel="force [g]")
+    axis.legend(fontsize=8)
+
+
+def _draw_contact_points(axis: Axes) -> None:
+    """Eq. 11 with the slopes of the node that touches, for which the paper prints no numbers."""
+    estimator, _ = calibrated()
+    loads = np.array([0, *paper.LOADS])
+    for node in paper.FIG_10B_NODES:
+        x, y, turn = fitted_slopes(ROBOT, *FIT_RANGE, node=node)
+        per_load = -ROBOT.offset_mm * turn / (estimator.friction * y + x)
+        axis.plot(loads, per_load * loads, "o-", ms=3, label=f"node {node + 1}: {per_load:.3f} per load")
+    axis.set(title="Fig. 10b: eq. 11 at several contact points", xlabel="cable load [g]", ylabel="force [g]")
     axis.legend(fontsize=8)
 
 

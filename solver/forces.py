@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.equilibrium import Equilibrium
-from solver.free import clearance, free_tension, tip_slopes
+from solver.free import clearance, fitted_slopes, free_tension, tip_slopes
 from solver.robot import Robot
 
 
@@ -54,11 +54,16 @@ class VirtualWork:
     ``n`` is the outward normal, ``t`` the same turned by +90°, ``P_l`` the tension since the onset of the contact. For
     a wall with normal (−1, 0) this is eq. 11. Several obstacles share one unknown in proportion to their multipliers.
 
+    No constant of the material enters: the estimate is in the unit of the tension.
+
     Attributes:
         friction: Ratio μ of tangential to normal force, found from one experiment (:meth:`calibrated`).
+        fit_range_mm: Range of cable displacement that straight lines are fitted over for the slopes, as in Fig. 7;
+            ``None`` for the exact slopes where the robot is.
     """
 
     friction: float = 0.0
+    fit_range_mm: tuple[float, float] | None = None
 
     def estimate(self, equilibrium: Equilibrium, onset: Onset) -> np.ndarray:
         """Estimated contact force, ``(m, 2)`` [N]."""
@@ -67,10 +72,14 @@ class VirtualWork:
             return directions
         for obstacle, multiplier, normal in _contacts(equilibrium):
             directions[obstacle] += multiplier * (normal + self.friction * np.array([-normal[1], normal[0]]))
-        slopes = tip_slopes(equilibrium.robot.at(equilibrium.length_mm), equilibrium.cable_mm)
+        slopes = self.slopes(equilibrium.robot.at(equilibrium.length_mm), equilibrium.cable_mm)
         work = float((directions @ slopes[:2]).sum())
         load = equilibrium.robot.offset_mm * (equilibrium.tension - onset.tension) * slopes[2]
         return directions * (load / work) if work < 0 else np.zeros_like(directions)
+
+    def slopes(self, robot: Robot, cable_mm: float) -> np.ndarray:
+        """Slopes of the tip pose that the estimate is made with, ``(3,)`` [mm, mm, rad per mm]."""
+        return fitted_slopes(robot, *self.fit_range_mm) if self.fit_range_mm else tip_slopes(robot, cable_mm)
 
     @classmethod
     def calibrated(cls, force: float, load: float, slopes: np.ndarray, offset_mm: float) -> "VirtualWork":

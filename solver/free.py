@@ -23,22 +23,28 @@ class _Segment(NamedTuple):
     stretch: float
 
 
-def tip_slopes(robot: Robot, cable_mm: float) -> np.ndarray:
-    """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
+def tip_slopes(robot: Robot, cable_mm: float, node: int | None = None) -> np.ndarray:
+    """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm].
+
+    With ``node``, those of the node of that index, as if the robot ended there.
+    """
+    node = robot.segments if node is None else node
     angle, chord, turn, stretch = _segment(robot, cable_mm)
-    middles = np.arange(robot.segments) + 0.5
+    middles = np.arange(node) + 0.5
     sines, cosines, turns = np.sin(middles * angle), np.cos(middles * angle), middles * turn
     return np.array(
         [
             (stretch * sines + chord * turns * cosines).sum(),
             (stretch * cosines - chord * turns * sines).sum(),
-            -robot.segments * turn,
+            -node * turn,
         ]
     )
 
 
-def fitted_slopes(robot: Robot, low_mm: float, high_mm: float) -> np.ndarray:
+def fitted_slopes(robot: Robot, low_mm: float, high_mm: float, node: int = -1) -> np.ndarray:
     """Slopes of straight lines fitted to the free tip pose over a range of cable displacement (Fig. 7), as above.
+
+    With ``node``, those of the node of that index.
 
     Raises:
         ValueError: If the range is empty or outside the robot's.
@@ -46,7 +52,7 @@ def fitted_slopes(robot: Robot, low_mm: float, high_mm: float) -> np.ndarray:
     if not 0 <= low_mm < high_mm <= robot.cable_limit_mm:
         raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within 0 to {robot.cable_limit_mm:.6g} mm")
     cables = np.linspace(low_mm, high_mm, 101)
-    tips = np.array([free_nodes(robot, cable)[-1] for cable in cables])
+    tips = np.array([free_nodes(robot, cable)[node] for cable in cables])
     return np.asarray(np.polyfit(cables, tips, 1)[0])
 
 

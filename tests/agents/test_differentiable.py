@@ -5,6 +5,7 @@ import torch
 
 from agents.differentiable import differentiable
 from solver import Circle, Robot, Scene, Solver, Status
+from solver.sensitivity import CABLE, LENGTH, obstacle_rows
 
 
 @pytest.fixture
@@ -33,6 +34,29 @@ def test_gradients(solver):
         assert cables.grad[k].item() == pytest.approx(difference, rel=1e-5)
 
 
+def test_gradients_in_every_command_and_the_place_of_an_obstacle():
+    robot = Robot(length_mm=180, segments=18, offset_mm=8, cable="sliding", length_range_mm=(170, 190))
+    rows = (CABLE, LENGTH, obstacle_rows(0).start)
+
+    def solved(values):
+        cable, length, x = values.tolist()
+        solver = Solver(robot, Scene([Circle(center=(x, 104), radius=15, stiffness=1.0)]))
+        equilibrium = solver.rest()
+        for part in range(1, 11):
+            equilibrium = solver.step(equilibrium, cable * part / 10, 180 + (length - 180) * part / 10)
+        return equilibrium
+
+    def value(values):
+        nodes, tension, forces = differentiable(values[None], [solved(values.detach())], rows)
+        return nodes[0, -1].sum() + tension[0] + 10 * forces[0, 0, 0]
+
+    at = torch.tensor([9.0, 178.0, 44.0], dtype=torch.float64, requires_grad=True)
+    value(at).backward()
+    for k, step in enumerate(1e-4 * torch.eye(3, dtype=torch.float64)):
+        difference = (value(at + step) - value(at - step)).item() / 2e-4
+        assert at.grad[k].item() == pytest.approx(difference, rel=1e-5)
+
+
 def test_a_set_point_is_found_by_gradient_descent(solver):
     """Newton's method on the contact force, through the solver."""
     cable = torch.tensor([8.0], dtype=torch.float64, requires_grad=True)
@@ -55,5 +79,5 @@ def test_no_gradient_where_the_cable_does_not_follow():
 
 
 def test_shape(solver):
-    with pytest.raises(ValueError, match=r"cable_mm has shape \(2,\); it must be \(1,\)"):
+    with pytest.raises(ValueError, match=r"values has shape \(2,\); it must be \(1, 1\)"):
         differentiable(torch.zeros(2), [solver.rest()])

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver
+from solver import Capsule, Circle, Ellipse, Equilibrium, HalfPlane, Polygon, Robot, Scene, Solver
 from solver.forces import Onset, VirtualWork, force_true
 from solver.formulation import node_derivatives
-from solver.free import tip_slopes
+from solver.free import fitted_slopes, tip_slopes
 from solver.robot import CABLES
 
 SCENES = [
@@ -103,6 +103,43 @@ def test_estimate_on_a_wall_is_equation_11():
         force = VirtualWork(friction).estimate(equilibrium, onset)[0]
         assert force == pytest.approx([horizontal, friction * horizontal])
     assert horizontal < 0  # the wall pushes the robot back
+
+
+@EVERY_SCENE
+def test_estimate_knows_nothing_of_the_material(scene):
+    _, equilibrium, onset = pulled(scene, 8.0)
+    stiffer = replace(equilibrium.robot, rigidity=3 * equilibrium.robot.rigidity)
+    springs = (None if o.stiffness is None else 3 * o.stiffness_matrix for o in scene)
+    scaled = Scene(replace(o, stiffness=k) for o, k in zip(scene, springs, strict=True))
+    block = equilibrium.block.copy()
+    block[2] *= 3
+    same = Equilibrium(stiffer, scaled, block, equilibrium.status, 0)
+    estimate = VirtualWork().estimate(equilibrium, onset)
+    assert estimate.any()
+    assert VirtualWork().estimate(same, Onset(3 * onset.tension)) == pytest.approx(3 * estimate, rel=1e-12)
+    assert max(same.residuals()) < 1e-8
+
+
+def test_estimate_with_straight_line_slopes():
+    _, equilibrium, onset = pulled(SCENES[2], 7.0)
+    fitted = VirtualWork(0.4, fit_range_mm=(0.0, 8.0))
+    x, y, turn = fitted_slopes(equilibrium.robot, 0.0, 8.0)
+    horizontal = equilibrium.robot.offset_mm * (equilibrium.tension - onset.tension) * turn / (0.4 * y + x)
+    assert fitted.estimate(equilibrium, onset)[0] == pytest.approx([horizontal, 0.4 * horizontal])
+    narrow = VirtualWork(0.4, fit_range_mm=(6.999, 7.001)).estimate(equilibrium, onset)
+    assert narrow == pytest.approx(VirtualWork(0.4).estimate(equilibrium, onset), rel=1e-6)
+
+
+def test_estimate_shares_one_load_among_several_contacts():
+    """The work of all estimated forces on the free tip is that of the load, and each follows its multipliers."""
+    _, equilibrium, onset = pulled(SCENES[1], 5.0, step=0.05)
+    forces, energy = VirtualWork().estimate(equilibrium, onset), force_true(equilibrium)
+    assert np.all(np.linalg.norm(forces, axis=1) > 0)
+    slopes = tip_slopes(equilibrium.robot, equilibrium.cable_mm)
+    load = equilibrium.tension - onset.tension
+    assert (forces @ slopes[:2]).sum() == pytest.approx(equilibrium.robot.offset_mm * load * slopes[2])
+    ratio = forces[energy != 0] / energy[energy != 0]
+    assert ratio == pytest.approx(ratio[0], rel=1e-9)
 
 
 def test_table_1_theoretical_column_from_one_calibration_point():

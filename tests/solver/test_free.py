@@ -32,6 +32,8 @@ def test_slopes_of_the_tip(cable):
     robot, h = robot_with(cable), 1e-5
     slopes = (free_nodes(robot, 5 + h)[-1] - free_nodes(robot, 5 - h)[-1]) / (2 * h)
     assert tip_slopes(robot, 5.0) == pytest.approx(slopes, rel=1e-7)
+    slopes = (free_nodes(robot, 5 + h)[14] - free_nodes(robot, 5 - h)[14]) / (2 * h)
+    assert tip_slopes(robot, 5.0, node=14) == pytest.approx(slopes, rel=1e-7)
 
 
 @EVERY_CABLE
@@ -40,6 +42,7 @@ def test_fitted_slopes_lie_between_and_tend_to_the_exact_ones(cable):
     fitted, low, high = fitted_slopes(robot, 2.0, 6.0), tip_slopes(robot, 2.0), tip_slopes(robot, 6.0)
     assert np.all((np.minimum(low, high) <= fitted) & (fitted <= np.maximum(low, high)))
     assert fitted_slopes(robot, 3.999, 4.001) == pytest.approx(tip_slopes(robot, 4.0), rel=1e-6)
+    assert fitted_slopes(robot, 3.999, 4.001, node=9) == pytest.approx(tip_slopes(robot, 4.0, node=9), rel=1e-6)
     with pytest.raises(ValueError, match="range is 5 to 2"):
         fitted_slopes(robot, 5, 2)
 
