@@ -43,7 +43,8 @@ class Equilibrium:
     Attributes:
         robot: The robot.
         scene: The obstacles.
-        block: Everything below as one array, as the kernel reads and writes it.
+        block: Everything below as one array, as the kernel reads and writes it, and how it has changed on the way,
+            from which the search for the next one starts.
         status: How the step that led here ended.
         iterations: Newton iterations of that step.
     """
@@ -129,13 +130,18 @@ class Equilibrium:
 
     def _contacts(self, which: int) -> np.ndarray:
         shape = (len(self.scene), len(self.robot.touch), self.robot.positions)
-        start, size = 9 + 6 * self.robot.segments, math.prod(shape)
+        start, size = self._contacts_start, math.prod(shape)
         return self.block[start + which * size : start + (which + 1) * size].reshape(shape)
+
+    @property
+    def _contacts_start(self) -> int:
+        return 9 + 6 * self.robot.segments
 
     @property
     def displacements(self) -> np.ndarray:
         """How far each obstacle has been pushed from its place, zero for a fixed one, ``(m, 2)`` [mm]."""
-        return self.block[self.block.size - 2 * len(self.scene) :].reshape(-1, 2)
+        start, size = self._contacts_start, 2 * self.gaps.size
+        return self.block[start + size : start + size + 2 * len(self.scene)].reshape(-1, 2)
 
     @property
     def scene_now(self) -> Scene:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from solver._kernel import MAX_ACTIVE
 from solver.equilibrium import Equilibrium
 from solver.formulation import node_derivatives, node_problem
 from solver.free import free_angle, free_tension
@@ -288,6 +289,7 @@ class ReferenceSolver:
             multipliers,
             self._gaps(nodes, displacements),
             displacements,
+            np.zeros(len(pose.turns) + self._mounts(point).size + MAX_ACTIVE),
         ]
         block = np.concatenate([np.ravel(part) for part in parts])
         return Equilibrium(self.robot, self.scene, block, status, iterations)

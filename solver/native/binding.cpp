@@ -103,6 +103,7 @@ class Kernel {
 NB_MODULE(_kernel, m) {
   m.doc() = "Planar chain solver: Riccati-Newton SQP on the reduced coordinates, followed along a branch.";
   m.attr("SHAPE_SIZE") = ccr::kShapeSize;
+  m.attr("MAX_ACTIVE") = ccr::limits::kMaxActive;
   m.def("measure_gaps", &measure_gaps, "kind"_a, "parameters"_a, "points"_a, "gaps"_a,
         "Write value, x and y slope of the gap of each point to one obstacle.");
   nb::class_<Kernel>(m, "Kernel", "Solver of one robot in one scene; holds scratch memory and no state between calls.")

@@ -27,6 +27,8 @@ Branch<Model>::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles
       levers_(robot.segments + 1),
       points_(robot.points()) {
   present_.controls.resize(robot.segments);
+  trend_.controls.resize(robot.segments);
+  trend_.mounts.resize(newton_.chain.mounts());
   present_.mounts.resize(newton_.chain.mounts());
   trial_ = present_;
 }
@@ -34,7 +36,7 @@ Branch<Model>::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles
 template <class Model>
 std::size_t Branch<Model>::block_size() const {
   const std::size_t n = present_.controls.size();
-  return 4 + n + 5 * (n + 1) + 2 * newton_.chain.contacts() + 2 * newton_.chain.obstacles().size();
+  return 4 + n + 5 * (n + 1) + 2 * newton_.chain.contacts() + 2 * newton_.chain.obstacles().size() + n + 2 * trend_.mounts.size() + kMaxActive;
 }
 
 template <class Model>
@@ -57,17 +59,20 @@ void Branch<Model>::load(const double* block) {
   place_points(newton_.chain.robot(), nodes_, levers_, points_);
   ActiveSet& active = present_.active;
   active.count = 0;
-  if (Model::kSliding && tension_ > 0) {
-    active.contact[0] = newton_.chain.contacts();
-    active.multiplier[0] = tension_ / newton_.chain.robot().stiffness(present_.command.length);
-    active.count = 1;
-  }
   for (int c = 0; c < newton_.chain.contacts(); ++c)
     if (block[c] > 0 && active.count < kMaxActive) {
       active.contact[active.count] = c;
       active.multiplier[active.count++] = block[c];
     }
+  if (Model::kSliding && tension_ > 0 && active.count < kMaxActive) {
+    active.contact[active.count] = newton_.chain.contacts();
+    active.multiplier[active.count++] = tension_ / newton_.chain.robot().stiffness(present_.command.length);
+  }
   settled_ = false;
+  const double* trend = displacements;
+  for (Control& control : trend_.controls) control[0] = *trend++;
+  for (Position& mount : trend_.mounts) mount = {{*trend++, *trend++}};
+  std::copy_n(trend, kMaxActive, trend_.multipliers.begin());
 }
 
 template <class Model>
@@ -92,6 +97,14 @@ void Branch<Model>::store(double* block) const {
     const int mount = chain.mount_of(j);
     for (int k = 0; k < 2; ++k) *block++ = mount < 0 ? 0.0 : present_.mounts[mount][k];
   }
+  for (const Control& control : trend_.controls) *block++ = control[0];
+  for (const Position& mount : trend_.mounts) block = std::copy(mount.v.begin(), mount.v.end(), block);
+  std::fill_n(block, kMaxActive, 0.0);
+  const auto begin = present_.active.contact.begin(), end = begin + present_.active.count;
+  for (int j = 0; j < present_.active.count; ++j) {
+    const auto rank = std::count_if(begin, end, [&](int contact) { return contact < begin[j]; });
+    block[rank] = trend_.multipliers[j];
+  }
 }
 
 template <class Model>
@@ -104,10 +117,46 @@ void Branch<Model>::remember() {
 
 template <class Model>
 void Branch<Model>::accept() {
+  learn();
   std::swap(present_, trial_);
   tension_ = trial_tension_;
   settled_ = true;
   remember();
+}
+
+template <class Model>
+void Branch<Model>::learn() {
+  const ActiveSet &before = present_.active, &now = trial_.active;
+  const double pulled = trial_.command.cable - present_.command.cable;
+  forget();
+  if (pulled == 0 || trial_.command.length != present_.command.length || !newton_.chain.touching(now) ||
+      before.count != now.count || !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
+    return;
+  for (std::size_t i = 0; i < trend_.controls.size(); ++i)
+    trend_.controls[i][0] = (trial_.controls[i][0] - present_.controls[i][0]) / pulled;
+  for (std::size_t m = 0; m < trend_.mounts.size(); ++m)
+    for (int k = 0; k < 2; ++k) trend_.mounts[m][k] = (trial_.mounts[m][k] - present_.mounts[m][k]) / pulled;
+  for (int j = 0; j < now.count; ++j) trend_.multipliers[j] = (now.multiplier[j] - before.multiplier[j]) / pulled;
+}
+
+template <class Model>
+void Branch<Model>::forget() {
+  std::fill(trend_.controls.begin(), trend_.controls.end(), Control{});
+  std::fill(trend_.mounts.begin(), trend_.mounts.end(), Position{});
+  trend_.multipliers.fill(0);
+}
+
+// From `present_` along the trend.
+template <class Model>
+void Branch<Model>::predict() {
+  const double pulled = trial_.command.cable - present_.command.cable;
+  for (std::size_t i = 0; i < trend_.controls.size(); ++i)
+    trial_.controls[i][0] = present_.controls[i][0] + pulled * trend_.controls[i][0];
+  for (std::size_t m = 0; m < trend_.mounts.size(); ++m)
+    for (int k = 0; k < 2; ++k) trial_.mounts[m][k] = present_.mounts[m][k] + pulled * trend_.mounts[m][k];
+  trial_.active = present_.active;
+  for (int j = 0; j < trial_.active.count; ++j)
+    trial_.active.multiplier[j] = std::max(0.0, trial_.active.multiplier[j] + pulled * trend_.multipliers[j]);
 }
 
 template <class Model>
@@ -160,9 +209,7 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   trial_.command = command;
   if (!attempt_free()) {
     if (!Model::kSliding && command.cable <= 0) return Move::kRejected;
-    trial_.controls = present_.controls;
-    trial_.mounts = present_.mounts;
-    trial_.active = present_.active;
+    predict();
     const Verdict verdict = newton_.solve(trial_);
     iterations += verdict.iterations;
     if (!verdict.converged) return Move::kRejected;
@@ -272,6 +319,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && finish();
     if (!finished && !descend(moved)) continue;
     settled_ = false;
+    forget();
     settle();
     if (holding && tension_ > newton_.chain.robot().max_tension) return undo(End::kOverTension);
     double farthest = 0;

@@ -1,8 +1,8 @@
 // An equilibrium followed from command to command, as the robot would move.
 #pragma once
 
+#include <array>
 #include <cstddef>
-
 #include <vector>
 
 #include "newton.hpp"
@@ -17,7 +17,9 @@ class Follower {
   virtual ~Follower() = default;
 
   // An equilibrium as one block of numbers, in this order: cable, length, tension, objective; coordinate of each
-  // segment; x, y, angle of each node; x, y of each cable point; multiplier of each contact; gap of each contact.
+  // segment; x, y, angle of each node; x, y of each cable point; multiplier of each contact; gap of each contact;
+  // displacement x, y of each obstacle; trend of the coordinates, of the displacements of the mounted obstacles, and of
+  // the multipliers of the active contacts in the order of the contacts.
   virtual std::size_t block_size() const = 0;
 
   // Takes the robot from the equilibrium in one block towards `target`, cable and length evenly, and writes the one
@@ -26,6 +28,14 @@ class Follower {
 
   int iterations = 0;                    // of Newton's method in the last follow
   std::vector<double>* trace = nullptr;  // when set, receives (x, y, angle) of every node at every accepted shape
+};
+
+// How an equilibrium has changed per millimetre of cable, to start the search for the next one; zero where it is free, or
+// a contact came or went.
+struct Trend {
+  std::vector<Control> controls;
+  std::vector<Position> mounts;
+  std::array<double, limits::kMaxActive> multipliers{};  // in the order of the active set
 };
 
 template <class Model>
@@ -55,11 +65,15 @@ class Branch : public Follower {
   bool descend(bool& moved);
   bool passable(double allowed) const;
   void accept();
+  void learn();
+  void forget();
+  void predict();
   void remember();
   void settle();
 
   Newton<Model> newton_;
   Iterate present_, trial_;
+  Trend trend_;  // of `present_`
   double tension_ = 0, trial_tension_ = 0;
   std::vector<Position> nodes_, levers_;  // of the block last read
   std::vector<Position> points_, mounts_;  // of the last accepted shape
