@@ -133,12 +133,13 @@ def segment_function() -> ca.Function:
     sine, pull, length, offset, u = (ca.SX.sym(name) for name in ("sine", "pull", "length", "offset", "half_sine"))
     closure = segment_closure(u, sine, pull, length, offset)
     in_u, in_sine, in_pull = (ca.gradient(closure, variable) for variable in (u, sine, pull))
-    per_closure = -1 / in_u
+    cosine, half_cosine = ca.sqrt(1 - sine**2), ca.sqrt(1 - u**2)
+    cosines = cosine * half_cosine
+    per_all = 1 / (in_u * cosines)  # one division serves for three
+    per_closure, per_cosine, per_half_cosine = -per_all * cosines, per_all * in_u * half_cosine, per_all * in_u * cosine
     u_sine = in_sine * per_closure
     u_pull = in_pull * per_closure
     bent = ca.gradient(in_sine, sine) + 2 * ca.gradient(in_sine, u) * u_sine + ca.gradient(in_u, u) * u_sine**2
-    cosine, half_cosine = ca.sqrt(1 - sine**2), ca.sqrt(1 - u**2)
-    per_cosine, per_half_cosine = 1 / cosine, 1 / half_cosine
     slope = 2 * per_half_cosine * u_sine
     curvature = 2 * per_half_cosine * (bent * per_closure + u * (per_half_cosine * u_sine) ** 2)
     law = ca.vertcat(
@@ -171,7 +172,7 @@ def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
 
 
 def arc_function() -> ca.Function:
-    """``(θ, l0, a) → f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''`` of a segment that is an arc, for a sliding cable.
+    """``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''`` of a segment that is an arc, for a sliding cable.
 
     The chord ``c = l0 sinc θ/2`` along the bisector has the components ``l0·(f, g)`` in the frame of the lower disk,
     ahead and to its left; ``s = l0 − c + 2a sin θ/2`` is what the segment takes from the cable (Rao 2024).
@@ -183,6 +184,7 @@ def arc_function() -> ca.Function:
     shortening = length * (1 - sinc) + 2 * offset * sine
     taken = ca.gradient(shortening, angle)
     law = ca.vertcat(
+        angle,
         sinc * cosine,
         -sinc * sine,
         bent / sinc,

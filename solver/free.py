@@ -95,7 +95,7 @@ def _segment(robot: Robot, cable_mm: float) -> _Segment:
     for _ in range(NEWTON_ITERATIONS):
         *_, taken, slope, _ = _arc(angle, length, offset)
         angle -= (taken - pull) / slope
-    _, _, stretch, *_, slope, _ = _arc(angle, length, offset)
+    _, _, _, stretch, *_, slope, _ = _arc(angle, length, offset)
     chord, turn = length * np.sinc(angle / (2 * np.pi)), 1 / (robot.segments * slope)
     return _Segment(float(angle), float(chord), float(turn), float(stretch * chord * turn))
 

@@ -97,21 +97,22 @@ bool Chain<Model>::evaluate(const Iterate& at) {
   pull_ = command.cable / n;
   length_ = command.length / n;
   objective_ = steepest_ = 0;
-  Model::bend(n, at.controls[0].v.data(), pull_, length_, robot_.offset, bends_.data());
+  Model::bend(n, at.controls[0].v.data(), pull_, length_, robot_.offset, bends_);
   states_[0] = {};
   levers_[0] = {{robot_.offset, 0}};
   const double scale = length_ / robot_.offset;
   double widest = 0;
   for (int i = 0; i < n; ++i) {
-    auto& bend = bends_[i];
+    const auto bend = bends_[i];
     const double c = levers_[i][0], s = levers_[i][1];  // of the lower disk, times the offset
-    bend.dx = -scale * (s * bend.forward + c * bend.sideways);
-    bend.dy = scale * (c * bend.forward - s * bend.sideways);
+    const double dx = -scale * (s * bend.forward + c * bend.sideways);
+    const double dy = scale * (c * bend.forward - s * bend.sideways);
+    bends_.place(i, dx, dy);
     levers_[i + 1] = {{c * bend.cosine + s * bend.sine, s * bend.cosine - c * bend.sine}};
     State& next = states_[i + 1];
     next = states_[i];
-    next[0] += bend.dx;
-    next[1] += bend.dy;
+    next[0] += dx;
+    next[1] += dy;
     next[2] -= bend.angle;
     if constexpr (Model::kSliding) next[3] += bend.taken;
     objective_ += bend.angle * bend.angle;
@@ -147,14 +148,16 @@ void Chain<Model>::relax(Iterate& at) const {
   if constexpr (Model::kSliding) {
     if (command.cable > 0) {
       const double pull = command.cable / robot_.segments, length = command.length / robot_.segments;
-      typename Model::Bend bend;
+      typename Model::Bends bends(1);
       each[0] = pull / robot_.offset;
+      double slope = 1;
       for (int i = 0; i < limits::kRelaxIterations; ++i) {
-        Model::bend(1, each.v.data(), pull, length, robot_.offset, &bend);
-        each[0] -= (bend.taken - pull) / bend.taken_slope;
+        Model::bend(1, each.v.data(), pull, length, robot_.offset, bends);
+        slope = bends[0].taken_slope;
+        each[0] -= (bends[0].taken - pull) / slope;
       }
       at.active.contact[0] = contacts();
-      at.active.multiplier[0] = 2 * each[0] / bend.taken_slope;
+      at.active.multiplier[0] = 2 * each[0] / slope;
       at.active.count = 1;
     }
   }
@@ -179,7 +182,7 @@ void Chain<Model>::measure_gaps(double slack) {
     const Position moved = mount_of_[j] < 0 ? Position{} : displacements_[mount_of_[j]];
     const int first = j * robot_.points();
     for (int i = 0; i <= n; ++i) {
-      const double distance = clearance(obstacle, minus(nodes_[i], moved)) - reach_;
+      const double distance = clearance_beyond(obstacle, minus(nodes_[i], moved), reach_);
       if (distance > 0) {
         i += static_cast<int>(std::min(distance / length_, static_cast<double>(n)));
         continue;
@@ -283,7 +286,7 @@ void Chain<Model>::reduced_gradient(const ActiveSet& active) {
   }
   State p;
   for (int i = robot_.segments - 1; i >= 0; --i) {
-    const auto& bend = bends_[i];
+    const auto bend = bends_[i];
     p -= pulls_[i + 1];
     adjoints_[i] = p;
     const double turn = moment(p, bend);
@@ -296,7 +299,7 @@ void Chain<Model>::reduced_gradient(const ActiveSet& active) {
 template <class Model>
 void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
   for (int i = 0; i < robot_.segments; ++i) {
-    const auto& bend = bends_[i];
+    const auto bend = bends_[i];
     const State& p = adjoints_[i];
     const double turn = moment(p, bend), inward = ccr::inward(p, bend), heading = bend.heading_slope;
     typename System::Stage& stage = system.stages[i];
@@ -356,7 +359,7 @@ double Chain<Model>::tension(const ActiveSet& active) const {
     return stiffness() * slope;
   } else {
     for (int i = 0; i < robot_.segments; ++i) {
-      const auto& bend = bends_[i];
+      const auto bend = bends_[i];
       const State& p = adjoints_[i];
       slope += bend.pull_slope * (2 * bend.angle - moment(p, bend) / 2 - p[2]);
     }

@@ -176,7 +176,7 @@ class Chain {
   double reach_ = 0;  // from a node, within which its points may be near an obstacle
   double pull_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
   double objective_ = 0, energy_ = 0, steepest_ = 0;
-  std::vector<typename Model::Bend> bends_;
+  typename Model::Bends bends_;
   std::vector<Position> origin_;  // nodes of the shape looked around from
   std::vector<Position> mount_origin_;  // mounts of that shape
   std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach

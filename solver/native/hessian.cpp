@@ -51,12 +51,12 @@ Mat<N, N> outer(double scale, const Vec<N>& a, const Vec<N>& b) {
 template <class Model>
 void Hessian<Model>::shape(const Chain& chain, const ActiveSet& active, double strength) {
   chain.curvature(active, system_);
+  steepest_ = 0;
+  for (const auto& stage : system_.stages) steepest_ = std::max(steepest_, std::abs(stage.huu[0]));
   for (int j = 0; j < active.count; ++j) {
-    penalty_[j] = 0;
-    if (strength == 0) continue;
     const Force slope = chain.slope(active.contact[j]).force;
     const double arm = chain.lever_arm(active.contact[j]);
-    penalty_[j] = strength / (arm * arm);
+    penalty_[j] = strength * steepest_ / (arm * arm);
     system_.node_hessian[slope.node] += outer(penalty_[j], slope.here, slope.here);
     if (!slope.split) continue;
     system_.node_hessian[slope.node + 1] += outer(penalty_[j], slope.next, slope.next);
@@ -166,13 +166,6 @@ void Hessian<Model>::respond(const Chain& chain, std::span<const Load> loads) {
     }
     complete(*load.response);
   }
-}
-
-template <class Model>
-double Hessian<Model>::steepest() const {
-  double steepest = 0;
-  for (const auto& stage : system_.stages) steepest = std::max(steepest, std::abs(stage.huu[0]));
-  return steepest;
 }
 
 template struct Direction<UniformCable>;

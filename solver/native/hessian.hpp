@@ -35,7 +35,7 @@ class Hessian {
 
   Hessian(int segments, int mounts);
 
-  // Takes the curvature at a shape, with a penalty of this strength on each active gap.
+  // Takes the curvature at a shape, with a penalty on each active gap of this strength over the largest curvature.
   void shape(const Chain& chain, const ActiveSet& active, double strength);
   // True exactly when it is positive definite, with this damping of all unknowns.
   bool factor(double damping);
@@ -43,7 +43,7 @@ class Hessian {
   void respond(const Chain& chain, std::span<const Load> loads);
 
   double penalty(int j) const { return penalty_[j]; }  // on an active gap, in their order
-  double steepest() const;                             // largest curvature of a control
+  double steepest() const { return steepest_; }        // largest curvature of a control
 
  private:
   using System = ccr::System<Model>;
@@ -67,6 +67,7 @@ class Hessian {
   int touched_ = 0;             // columns in use
   std::vector<double> schur_;   // Cholesky factor, (touched, touched)
   std::vector<double> moves_;   // of the touched columns
+  double steepest_ = 0;
   double arm_ = 1;              // turns the damping of a control into that of a displacement [mm]
   std::vector<typename System::Load> loads_;
 };

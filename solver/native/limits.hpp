@@ -21,7 +21,7 @@ inline constexpr double kArmijo = 1e-4;
 inline constexpr int kBacktracks = 6;
 
 // Broad phase: a point farther than this from an obstacle is not looked at before the answer is [mm].
-inline constexpr double kReach = 10.0;
+inline constexpr double kReach = 4.0;
 
 // Active set.
 inline constexpr int kMaxObstacles = 32;

@@ -30,10 +30,8 @@ bool Newton<Model>::equilibrium(const ActiveSet& active) const {
 template <class Model>
 bool Newton<Model>::convex(const ActiveSet& active, int penalties) {
   damping_ = 0;
-  hessian_.shape(chain, active, 0);
-  if (hessian_.factor(0)) return true;
-  double strength = kPenalty * hessian_.steepest();
-  for (int attempt = 0; active.count > 0 && attempt < penalties; ++attempt, strength *= kPenaltyGrowth) {
+  double strength = kPenalty;
+  for (int attempt = 0; attempt < (active.count > 0 ? penalties : 1); ++attempt, strength *= kPenaltyGrowth) {
     hessian_.shape(chain, active, strength);
     if (hessian_.factor(0)) return true;
   }

@@ -43,6 +43,14 @@ void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, co
 double clearance(const Obstacle& obstacle, const Position& point);
 double clearance(const Obstacle& obstacle, std::span<const Position> points);
 
+// How much farther than `reach` a point is at least, at most 0 when it is not.
+inline double clearance_beyond(const Obstacle& obstacle, const Position& point, double reach) {
+  if (obstacle.shape == Shape::kHalfPlane) return clearance(obstacle, point) - reach;
+  const double dx = point[0] - obstacle.center[0], dy = point[1] - obstacle.center[1];
+  const double square = dx * dx + dy * dy, within = obstacle.radius + reach;
+  return square <= within * within ? 0.0 : std::sqrt(square) - within;
+}
+
 // Whether the straight path from one point outside to another stays out of the obstacle, but for its very rim.
 bool passes(const Obstacle& obstacle, const Position& from, const Position& to);
 

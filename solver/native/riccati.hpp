@@ -81,13 +81,20 @@ class Riccati {
     Vec<NX>* dx;  // (n+1)
   };
 
-  // Solves for several loads in one sweep: H⁻¹ times the force, or -H⁻¹ times the slope.
+  // Solves for several loads: H⁻¹ times the force, or -H⁻¹ times the slope.
   void respond(std::span<const Load> loads) {
-    std::vector<Vec<NX>>& v = carried_;
-    std::fill_n(v.begin(), loads.size(), Vec<NX>{});
+    for (; loads.size() >= 2; loads = loads.subspan(2)) sweep<2>(loads.data());
+    if (!loads.empty()) sweep<1>(loads.data());
+  }
+
+ private:
+  // Several loads side by side: each waits for its own last result.
+  template <int W>
+  void sweep(const Load* loads) {
+    Vec<NX> v[W];
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
       const Stage& s = stages[i];
-      for (std::size_t k = 0; k < loads.size(); ++k) {
+      for (int k = 0; k < W; ++k) {
         for (const Force& force : loads[k].forces) {
           if (force.node == i + 1) v[k] -= force.here;
           if (force.node == i && force.split) v[k] -= force.next;
@@ -100,21 +107,22 @@ class Riccati {
         loads[k].du[i] = h;
       }
     }
-    for (const Load& load : loads) load.dx[0] = {};
+    Vec<NX> x[W];
+    for (int k = 0; k < W; ++k) loads[k].dx[0] = {};
     for (std::size_t i = 0; i < stages.size(); ++i)
-      for (const Load& load : loads) {
-        Vec<NU> u = times(gain_[i], load.dx[i]);
-        u += load.du[i];
-        for (int c = 0; c < NU; ++c) load.du[i][c] = -u[c];
-        load.dx[i + 1] = times(stages[i].a, load.dx[i]);
-        load.dx[i + 1] += times(stages[i].b, load.du[i]);
+      for (int k = 0; k < W; ++k) {
+        Vec<NU> u = times(gain_[i], x[k]);
+        u += loads[k].du[i];
+        for (int c = 0; c < NU; ++c) u[c] = -u[c];
+        x[k] = times(stages[i].a, x[k]);
+        x[k] += times(stages[i].b, u);
+        loads[k].du[i] = u;
+        loads[k].dx[i + 1] = x[k];
       }
   }
 
- private:
   std::vector<Mat<NU, NX>> gain_;
   std::vector<Mat<NU, NU>> factor_;
-  std::vector<Vec<NX>> carried_{kMaxLoads};
 };
 
 }  // namespace ccr

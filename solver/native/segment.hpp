@@ -1,7 +1,30 @@
 // The two models of a segment and its cable, with their generated laws for all segments of a robot.
 #pragma once
 
+#include <vector>
+
 namespace ccr {
+
+// Numbers of all segments, kept number by number so that the laws can write them several segments at a time.
+template <int Laws>
+class Table {
+ public:
+  explicit Table(int segments)
+      : stride_((segments + kPadding - 1) / kPadding * kPadding), values_((Laws + 2) * stride_) {}
+
+  double* row(int number) { return values_.data() + number * stride_; }
+  double at(int number, int segment) const { return values_[number * stride_ + segment]; }
+  void place(int segment, double dx, double dy) {  // the chord in the base frame
+    row(Laws)[segment] = dx;
+    row(Laws + 1)[segment] = dy;
+  }
+
+ private:
+  static constexpr int kPadding = 4;  // at least the width of the lanes
+
+  int stride_;
+  std::vector<double> values_;
+};
 
 // The cable is shared equally among the segments (the paper). A segment shears: its coordinate is σ, the sine of the
 // shear angle, and its backbone stays straight.
@@ -17,8 +40,16 @@ struct UniformCable {
     double dx, dy;                                // backbone segment in the base frame
   };
 
+  struct Bends : Table<10> {
+    using Table::Table;
+    Bend operator[](int i) const {
+      return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
+              at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
+    }
+  };
+
   // Fills all but dx and dy of n segments; NaN where the law has no value.
-  static void bend(int n, const double* sines, double pull, double length, double offset, Bend* bends);
+  static void bend(int n, const double* sines, double pull, double length, double offset, Bends& bends);
 };
 
 // The cable slides through all disks (Rao 2024). A segment is an arc, its coordinate the angle θ between its disks; what
@@ -37,7 +68,15 @@ struct SlidingCable {
     static constexpr double slope = 1, curvature = 0, heading_slope = -0.5, heading_curvature = 0;
   };
 
-  static void bend(int n, const double* angles, double pull, double length, double offset, Bend* bends);
+  struct Bends : Table<10> {
+    using Table::Table;
+    Bend operator[](int i) const {
+      return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
+              at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
+    }
+  };
+
+  static void bend(int n, const double* angles, double pull, double length, double offset, Bends& bends);
 };
 
 }  // namespace ccr
