@@ -1,6 +1,5 @@
 """The result of a solve: one equilibrium of the robot, immutable and complete."""
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from solver.formulation import node_derivatives
 from solver.geometry import touching_points
+from solver.layout import CABLE, LENGTH, OBJECTIVE, TENSION, Layout, layout
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
@@ -61,22 +61,22 @@ class Equilibrium:
     @property
     def cable_mm(self) -> float:
         """Cable displacement l, which differs from the command after a stall or jam [mm]."""
-        return float(self.block[0])
+        return float(self.block[CABLE])
 
     @property
     def length_mm(self) -> float:
         """Length of the backbone L0, which insertion changes [mm]."""
-        return float(self.block[1])
+        return float(self.block[LENGTH])
 
     @property
     def tension(self) -> float:
         """Cable tension dE/dl along the branch [N]."""
-        return float(self.block[2])
+        return float(self.block[TENSION])
 
     @property
     def objective(self) -> float:
         """Sum of squared disk angles J = Σθ² [rad²]."""
-        return float(self.block[3])
+        return float(self.block[OBJECTIVE])
 
     @property
     def energy(self) -> float:
@@ -93,20 +93,18 @@ class Equilibrium:
     @property
     def shear(self) -> np.ndarray:
         """Shear angle ψ of each segment, ``(n,)`` [rad]; zero with a sliding cable."""
-        sines = self.block[4 : 4 + self.robot.segments]
+        sines = self._layout.coordinates(self.block)
         return np.zeros_like(sines) if self.robot.cable == "sliding" else np.asarray(np.arcsin(sines))
 
     @property
     def nodes(self) -> np.ndarray:
         """Backbone point and disk angle of each node, ``(n+1, 3)`` [mm, mm, rad]."""
-        n = self.robot.segments
-        return self.block[4 + n : 7 + 4 * n].reshape(n + 1, 3)
+        return self._layout.nodes(self.block)
 
     @property
     def cable_nodes(self) -> np.ndarray:
         """Cable point on each disk, ``(n+1, 2)`` [mm]."""
-        n = self.robot.segments
-        return self.block[7 + 4 * n : 9 + 6 * n].reshape(n + 1, 2)
+        return self._layout.cable_nodes(self.block)
 
     @property
     def slack_mm(self) -> float:
@@ -121,27 +119,36 @@ class Equilibrium:
     @property
     def multipliers(self) -> np.ndarray:
         """Lagrange multipliers of the gaps, ``(m, p, k)`` [rad²/mm]."""
-        return self._contacts(0)
+        return self._layout.multipliers(self.block)
 
     @property
     def gaps(self) -> np.ndarray:
         """Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, p, k)`` [mm]."""
-        return self._contacts(1)
-
-    def _contacts(self, which: int) -> np.ndarray:
-        shape = (len(self.scene), len(self.robot.touch), self.robot.positions)
-        start, size = self._contacts_start, math.prod(shape)
-        return self.block[start + which * size : start + (which + 1) * size].reshape(shape)
-
-    @property
-    def _contacts_start(self) -> int:
-        return 9 + 6 * self.robot.segments
+        return self._layout.gaps(self.block)
 
     @property
     def displacements(self) -> np.ndarray:
         """How far each obstacle has been pushed from its place, zero for a fixed one, ``(m, 2)`` [mm]."""
-        start, size = self._contacts_start, 2 * self.gaps.size
-        return self.block[start + size : start + size + 2 * len(self.scene)].reshape(-1, 2)
+        return self._layout.displacements(self.block)
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Force of each obstacle on the robot, by energy, ``(m, 2)`` [N]."""
+        return self._layout.forces(self.block)
+
+    @property
+    def onset_tension(self) -> float:
+        """Cable tension where the present contact began, zero while nothing touches [N]."""
+        return float(self._layout.onset(self.block)[0])
+
+    @property
+    def tip_slopes(self) -> np.ndarray:
+        """Slopes of the free tip pose in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
+        return self._layout.tip_slopes(self.block)
+
+    @property
+    def _layout(self) -> Layout:
+        return layout(self.robot, len(self.scene))
 
     @property
     def scene_now(self) -> Scene:

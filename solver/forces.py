@@ -10,41 +10,39 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.equilibrium import Equilibrium
-from solver.free import clearance, fitted_slopes, free_tension, tip_slopes
+from solver.free import clearance, fitted_slopes, free_tension
 from solver.robot import Robot
 
 
 def force_true(equilibrium: Equilibrium) -> np.ndarray:
     """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 2)`` [N]."""
-    forces = np.zeros((len(equilibrium.scene), 2))
-    for obstacle, multiplier, normal in _contacts(equilibrium):
-        forces[obstacle] += equilibrium.stiffness * multiplier * normal
-    return forces
+    return equilibrium.forces.copy()
 
 
-@dataclass(frozen=True, slots=True)
-class Onset:
-    """Where the present contact began, which the estimate counts the cable load from.
+def virtual_work(
+    forces: np.ndarray,
+    load: np.ndarray,
+    slopes: np.ndarray,
+    offset_mm: float,
+    friction: float,
+) -> np.ndarray:
+    """Forces of the directions of others whose work on the tip is that of a cable load, ``(..., m, 2)`` [N].
 
-    Attributes:
-        tension: Cable tension at the onset [N]; ``None`` while nothing touches.
+    ``Σ c F_j·(1 + μ R)·x' = a P_l φ'`` for the unknown c, with R a quarter turn; zero where the directions do no work
+    against the motion.
+
+    Args:
+        forces: Forces that give directions and proportions, ``(..., m, 2)``.
+        load: Cable load P_l, ``(...)`` [N].
+        slopes: Slopes x', φ' of the free tip, ``(..., 3)``.
+        offset_mm: Distance a of the cable from the backbone [mm].
+        friction: Ratio μ of tangential to normal force.
     """
-
-    tension: float | None = None
-
-    def after(self, before: Equilibrium, now: Equilibrium) -> "Onset":
-        """The onset after a step: kept during a contact, forgotten when it ends, found when one begins.
-
-        A contact that begins inside a step does so on the free robot; the tension there is that of the free robot
-        where it first touches.
-        """
-        if not now.multipliers.any():
-            return Onset()
-        if self.tension is not None:
-            return self
-        if before.multipliers.any():
-            return Onset(before.tension)
-        return Onset(_first_tension(before, now))
+    turned = np.stack([-forces[..., 1], forces[..., 0]], axis=-1)
+    directions = forces + friction * turned
+    work = (directions * slopes[..., None, :2]).sum(axis=(-2, -1))
+    scale = offset_mm * load * slopes[..., 2] / np.where(work < 0, work, -np.inf)
+    return np.asarray(scale[..., None, None] * directions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,21 +63,13 @@ class VirtualWork:
     friction: float = 0.0
     fit_range_mm: tuple[float, float] | None = None
 
-    def estimate(self, equilibrium: Equilibrium, onset: Onset) -> np.ndarray:
+    def estimate(self, equilibrium: Equilibrium) -> np.ndarray:
         """Estimated contact force, ``(m, 2)`` [N]."""
-        directions = np.zeros((len(equilibrium.scene), 2))
-        if onset.tension is None:
-            return directions
-        for obstacle, multiplier, normal in _contacts(equilibrium):
-            directions[obstacle] += multiplier * (normal + self.friction * np.array([-normal[1], normal[0]]))
-        slopes = self.slopes(equilibrium.robot.at(equilibrium.length_mm), equilibrium.cable_mm)
-        work = float((directions @ slopes[:2]).sum())
-        load = equilibrium.robot.offset_mm * (equilibrium.tension - onset.tension) * slopes[2]
-        return directions * (load / work) if work < 0 else np.zeros_like(directions)
-
-    def slopes(self, robot: Robot, cable_mm: float) -> np.ndarray:
-        """Slopes of the tip pose that the estimate is made with, ``(3,)`` [mm, mm, rad per mm]."""
-        return fitted_slopes(robot, *self.fit_range_mm) if self.fit_range_mm else tip_slopes(robot, cable_mm)
+        slopes = equilibrium.tip_slopes
+        if self.fit_range_mm:
+            slopes = fitted_slopes(equilibrium.robot.at(equilibrium.length_mm), *self.fit_range_mm)
+        load = np.asarray(equilibrium.tension - equilibrium.onset_tension)
+        return virtual_work(equilibrium.forces, load, slopes, equilibrium.robot.offset_mm, self.friction)
 
     @classmethod
     def calibrated(cls, force: float, load: float, slopes: np.ndarray, offset_mm: float) -> "VirtualWork":
@@ -99,8 +89,16 @@ class VirtualWork:
         return cls(friction=float((-offset_mm * load * slopes[2] / force - slopes[0]) / slopes[1]))
 
 
-def _first_tension(before: Equilibrium, now: Equilibrium) -> float:
-    """Tension of the free robot where it first touches, between one that is clear and one in contact [N]."""
+def onset_tension(before: Equilibrium, now: Equilibrium) -> float:
+    """Tension where the present contact began, after a step: kept during a contact, zero while nothing touches [N].
+
+    A contact that begins inside a step does so on the free robot; the tension there is that of the free robot where it
+    first touches.
+    """
+    if not now.multipliers.any():
+        return 0.0
+    if before.multipliers.any():
+        return before.onset_tension
 
     def on_the_way(part: float) -> tuple[Robot, float]:
         length = before.length_mm + part * (now.length_mm - before.length_mm)
@@ -116,17 +114,3 @@ def _first_tension(before: Equilibrium, now: Equilibrium) -> float:
             middle = (clear + touching) / 2
             clear, touching = (middle, touching) if clear_of_all(middle) else (clear, middle)
     return free_tension(*on_the_way(touching))
-
-
-def _contacts(equilibrium: Equilibrium) -> list[tuple[int, float, np.ndarray]]:
-    """(obstacle, multiplier, outward normal) of every contact."""
-    multipliers = equilibrium.multipliers
-    found = multipliers.nonzero()
-    if not found[0].size:
-        return []
-    points, obstacles = equilibrium.points, equilibrium.scene.obstacles
-    displacements = equilibrium.displacements
-    return [
-        (j, float(multipliers[j, line, position]), obstacles[j].normal_at(points[line, position] - displacements[j]))
-        for j, line, position in zip(*(index.tolist() for index in found), strict=True)
-    ]

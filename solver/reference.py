@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from solver._kernel import MAX_ACTIVE
 from solver.equilibrium import Equilibrium
+from solver.forces import onset_tension
 from solver.formulation import node_derivatives, node_problem
-from solver.free import free_angle, free_tension
+from solver.free import free_angle, free_tension, tip_slopes
 from solver.geometry import touchable_points, touching_points
+from solver.layout import layout
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.solve import check_clear, check_command, check_width
@@ -125,9 +126,9 @@ class ReferenceSolver:
                 return Equilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.FAILED, iterations)
             iterations += following.iterations
             if self._tension(following) > max(self.robot.max_tension, self._tension(present)):
-                return self._equilibrium(self._limit(present, following), Status.STALLED, iterations)
+                return self._equilibrium(self._limit(present, following), Status.STALLED, iterations, equilibrium)
             present = following
-        return self._equilibrium(present, Status.CONVERGED, iterations)
+        return self._equilibrium(present, Status.CONVERGED, iterations, equilibrium)
 
     def _between(self, present: _Point, cable: float, length: float, part: float) -> _Point | None:
         """The solution a part of the way to a command."""
@@ -274,7 +275,9 @@ class ReferenceSolver:
         sines = sideways * self.robot.segments / length
         return _Pose(backbone, cable, angles, turns, turns if self._sliding else sines)
 
-    def _equilibrium(self, point: _Point, status: Status, iterations: int) -> Equilibrium:
+    def _equilibrium(
+        self, point: _Point, status: Status, iterations: int, before: Equilibrium | None = None
+    ) -> Equilibrium:
         pose = self._pose(point.unknowns, point.length)
         nodes = np.column_stack([pose.backbone, pose.angles])
         multipliers = np.zeros(self._touchable.shape)
@@ -289,9 +292,22 @@ class ReferenceSolver:
             multipliers,
             self._gaps(nodes, displacements),
             displacements,
-            np.zeros(len(pose.turns) + self._mounts(point).size + MAX_ACTIVE),
         ]
-        block = np.concatenate([np.ravel(part) for part in parts])
+        places = layout(self.robot, len(self.scene))
+        block = np.zeros(places.size)
+        numbers = np.concatenate([np.ravel(part) for part in parts])
+        block[: numbers.size] = numbers
+        points = touching_points(self.robot, nodes)
+        for j, obstacle in enumerate(self.scene):
+            normals = obstacle.normal_at(points - displacements[j])
+            stiffness = self.robot.at(point.length).stiffness
+            places.forces(block)[j] = stiffness * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
+        places.force(block)[:] = places.forces(block).sum(axis=0)
+        places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
+        places.flags(block)[:] = (multipliers > 0).any(axis=0).ravel()
+        places.tip_slopes(block)[:] = tip_slopes(self.robot.at(point.length), point.cable)
+        now = Equilibrium(self.robot, self.scene, block.copy(), status, iterations)
+        places.onset(block)[0] = 0.0 if before is None else onset_tension(before, now)
         return Equilibrium(self.robot, self.scene, block, status, iterations)
 
     def _gaps(self, nodes: np.ndarray, displacements: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solver import _kernel
 from solver._kernel import SHAPE_SIZE, Kernel
 from solver.compile import law_address
 from solver.equilibrium import Equilibrium
@@ -33,25 +34,8 @@ class Solver:
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self.robot = robot
         self.scene = scene
-        touchable = touchable_points(robot, scene)
         check_width(robot, scene)
-        extents = [obstacle.extent for obstacle in scene]
-        self._kernel = Kernel(
-            robot.cable == "sliding",
-            robot.segments,
-            robot.offset_mm,
-            robot.rigidity,
-            robot.max_tension,
-            robot.lengths_mm[1],
-            list(robot.lines_mm),
-            robot.between,
-            [SHAPES[obstacle.kind] for obstacle in scene],
-            np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
-            np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
-            touchable.reshape(len(scene), len(robot.touch) * robot.positions),
-            np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
-            [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
-        )
+        self._kernel = Kernel(robot.cable == "sliding", kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
         straight[1] = robot.length_mm
         self._rest = self._follow(straight, 0.0, robot.length_mm)
@@ -97,6 +81,32 @@ class Solver:
         reached = np.empty_like(block)
         status, iterations = self._kernel.step(block, cable_mm, length_mm, reached)
         return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
+
+
+def kernel_robot(robot: Robot) -> _kernel.Robot:
+    """A robot as the kernel takes it."""
+    lines, longest = list(robot.lines_mm), robot.lengths_mm[1]
+    return _kernel.Robot(
+        robot.segments, robot.offset_mm, robot.rigidity, robot.max_tension, longest, lines, robot.between
+    )
+
+
+def kernel_scene(robot: Robot, scene: Scene) -> _kernel.Scene:
+    """Obstacles as the kernel takes them.
+
+    Raises:
+        ValueError: If an obstacle names a node that the robot does not have.
+        RuntimeError: If a custom shape cannot be compiled.
+    """
+    extents = [obstacle.extent for obstacle in scene]
+    return _kernel.Scene(
+        [SHAPES[obstacle.kind] for obstacle in scene],
+        np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
+        np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
+        touchable_points(robot, scene).reshape(len(scene), len(robot.touch) * robot.positions),
+        np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
+        [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
+    )
 
 
 def check_width(robot: Robot, scene: Scene) -> None:

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "branch.hpp"
+#include "batch.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -45,6 +45,10 @@ std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& param
   return obstacles;
 }
 
+struct Scene {
+  std::vector<ccr::Obstacle> obstacles;
+};
+
 // Gaps of points (k, 2) to one obstacle and their slopes: value, x, y of each.
 void measure_gaps(int kind, const Input& parameters, const Input& points, const Output& gaps) {
   if (parameters.size() > ccr::kShapeSize || points.size() % 2 || 2 * gaps.size() != 3 * points.size())
@@ -59,17 +63,12 @@ void measure_gaps(int kind, const Input& parameters, const Input& points, const 
   }
 }
 
+// One robot in one scene.
 class Kernel {
  public:
-  Kernel(bool sliding, int segments, double offset, double rigidity, double max_tension, double max_length,
-         const std::vector<double>& lines, int between, const Kinds& kinds, const Input& parameters,
-         const Input& extents, const Mask& touchable, const Input& stiffness, const Addresses& laws) {
-    const ccr::Robot robot{segments, offset, rigidity, max_tension, max_length, lines, between};
-    const auto obstacles = read_obstacles(kinds, parameters, extents, touchable, stiffness, laws);
-    if (sliding)
-      branch_ = std::make_unique<ccr::Branch<ccr::SlidingCable>>(robot, obstacles);
-    else
-      branch_ = std::make_unique<ccr::Branch<ccr::UniformCable>>(robot, obstacles);
+  Kernel(bool sliding, const ccr::Robot& robot, std::vector<ccr::Obstacle> scene)
+      : scene_(std::move(scene)), branch_(ccr::make_follower(sliding, robot, static_cast<int>(scene_.size()))) {
+    branch_->enter(scene_);
   }
 
   std::size_t block_size() const { return branch_->block_size(); }
@@ -90,12 +89,79 @@ class Kernel {
     return shapes;
   }
 
+  bool reaches(double force, double increment, double limit, double length) {
+    return branch_->reaches(force, increment, limit, length);
+  }
+
  private:
   void expect(std::size_t size) const {
     if (size != branch_->block_size()) throw std::invalid_argument("block of the wrong size for this robot and scene");
   }
 
+  std::vector<ccr::Obstacle> scene_;
   std::unique_ptr<ccr::Follower> branch_;
+};
+
+using Blocks = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Commands = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Counts = nb::ndarray<int, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Values = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// Robots alike in scenes of equally many obstacles; their blocks and commands are the caller's arrays.
+class Fleet {
+ public:
+  Fleet(bool sliding, const ccr::Robot& robot, int count, int obstacles, int threads)
+      : batch_(sliding, robot, count, obstacles, threads), count_(count), obstacles_(obstacles) {}
+
+  std::size_t block_size() const { return batch_.block_size(); }
+
+  void assign(int robot, std::vector<ccr::Obstacle> scene) {
+    if (robot < 0 || robot >= count_ || static_cast<int>(scene.size()) != obstacles_)
+      throw std::invalid_argument("a robot of the fleet, and as many obstacles as it was made for");
+    batch_.scene(robot) = std::move(scene);
+  }
+
+  void step(const std::vector<int>& robots, const Commands& commands, const Blocks& blocks, const Counts& statuses,
+            const Counts& iterations) {
+    const std::size_t count = count_;
+    if (commands.shape(0) != count || commands.shape(1) != 2 || blocks.shape(0) != count ||
+        blocks.shape(1) != block_size() || statuses.shape(0) != count || iterations.shape(0) != count)
+      throw std::invalid_argument("one row of commands, blocks, statuses and iterations for each robot");
+    expect(robots);
+    double* block = blocks.data();
+    const double* command = commands.data();
+    int *status = statuses.data(), *counted = iterations.data();
+    const std::size_t size = block_size();
+    nb::gil_scoped_release released;
+    batch_.each(robots, [&](ccr::Follower& follower, int k) {
+      const int i = robots[k];
+      const ccr::Command target{command[2 * i], command[2 * i + 1]};
+      status[i] = static_cast<int>(follower.follow(block + size * i, target, block + size * i));
+      counted[i] = follower.iterations;
+    });
+  }
+
+  std::vector<int> reaches(const std::vector<int>& robots, const Values& forces, double increment, double limit,
+                           double length) {
+    if (forces.shape(0) != robots.size()) throw std::invalid_argument("one force for each robot");
+    expect(robots);
+    std::vector<int> found(robots.size());
+    const double* force = forces.data();
+    nb::gil_scoped_release released;
+    batch_.each(robots, [&](ccr::Follower& follower, int k) {
+      found[k] = follower.reaches(force[k], increment, limit, length);
+    });
+    return found;
+  }
+
+ private:
+  void expect(const std::vector<int>& robots) const {
+    for (const int robot : robots)
+      if (robot < 0 || robot >= count_) throw std::invalid_argument("robots of the fleet");
+  }
+
+  ccr::Batch batch_;
+  int count_, obstacles_;
 };
 
 }  // namespace
@@ -106,14 +172,45 @@ NB_MODULE(_kernel, m) {
   m.attr("MAX_ACTIVE") = ccr::limits::kMaxActive;
   m.def("measure_gaps", &measure_gaps, "kind"_a, "parameters"_a, "points"_a, "gaps"_a,
         "Write value, x and y slope of the gap of each point to one obstacle.");
+  nb::class_<ccr::Robot>(m, "Robot", "A robot as the kernel takes it.")
+      .def("__init__",
+           [](ccr::Robot* self, int segments, double offset, double rigidity, double max_tension, double max_length,
+              const std::vector<double>& lines, int between) {
+             new (self) ccr::Robot{segments, offset, rigidity, max_tension, max_length, lines, between};
+           },
+           "segments"_a, "offset"_a, "rigidity"_a, "max_tension"_a, "max_length"_a, "lines"_a, "between"_a);
+  nb::class_<Scene>(m, "Scene", "Obstacles as the kernel takes them, each a row of the arrays.")
+      .def("__init__",
+           [](Scene* self, const Kinds& kinds, const Input& parameters, const Input& extents, const Mask& touchable,
+              const Input& stiffness, const Addresses& laws) {
+             new (self) Scene{read_obstacles(kinds, parameters, extents, touchable, stiffness, laws)};
+           },
+           "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "stiffness"_a, "laws"_a);
   nb::class_<Kernel>(m, "Kernel", "Solver of one robot in one scene; holds scratch memory and no state between calls.")
-      .def(nb::init<bool, int, double, double, double, double, const std::vector<double>&, int, const Kinds&,
-                    const Input&, const Input&, const Mask&, const Input&, const Addresses&>(),
-           "sliding"_a, "segments"_a, "offset"_a, "rigidity"_a, "max_tension"_a, "max_length"_a, "lines"_a,
-           "between"_a, "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "stiffness"_a, "laws"_a)
+      .def("__init__",
+           [](Kernel* self, bool sliding, const ccr::Robot& robot, const Scene& scene) {
+             new (self) Kernel(sliding, robot, scene.obstacles);
+           },
+           "sliding"_a, "robot"_a, "scene"_a)
       .def_prop_ro("block_size", &Kernel::block_size, "Length of an equilibrium's block.")
       .def("step", &Kernel::step, "from_"_a, "cable"_a, "length"_a, "to"_a,
-           "Follow the branch from one block to a cable displacement and length into another; returns (status, iterations).")
+           "Follow the branch from one block to a cable displacement and length into another; (status, iterations).")
       .def("trace", &Kernel::trace, "from_"_a, "cable"_a, "length"_a,
-           "Node poses of every shape accepted on the way, flattened.");
+           "Node poses of every shape accepted on the way, flattened.")
+      .def("reaches", &Kernel::reaches, "force"_a, "increment"_a, "limit"_a, "length"_a,
+           "Whether steady pulls from rest reach a contact force without an event.");
+  nb::class_<Fleet>(m, "Fleet", "Many robots alike, each in a scene of its own; their states are the caller's arrays.")
+      .def("__init__",
+           [](Fleet* self, bool sliding, const ccr::Robot& robot, int count, int obstacles, int threads) {
+             if (count < 1 || obstacles < 0 || threads < 1) throw std::invalid_argument("positive numbers");
+             new (self) Fleet(sliding, robot, count, obstacles, threads);
+           },
+           "sliding"_a, "robot"_a, "count"_a, "obstacles"_a, "threads"_a)
+      .def_prop_ro("block_size", &Fleet::block_size, "Length of an equilibrium's block.")
+      .def("assign", [](Fleet& self, int robot, const Scene& scene) { self.assign(robot, scene.obstacles); }, "robot"_a,
+           "scene"_a, "Put a robot among other obstacles; its block stays as it is.")
+      .def("step", &Fleet::step, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a,
+           "Move some robots to their commands (cable, length), in place.")
+      .def("reaches", &Fleet::reaches, "robots"_a, "forces"_a, "increment"_a, "limit"_a, "length"_a,
+           "Whether steady pulls of some robots from rest reach their forces without an event.");
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace ccr {
 
@@ -21,13 +22,18 @@ Command between(const Command& a, const Command& b, double t) {
 }  // namespace
 
 template <class Model>
-Branch<Model>::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles)
+Branch<Model>::Branch(const Robot& robot, int obstacles)
     : newton_(robot, obstacles),
       nodes_(robot.segments + 1),
       levers_(robot.segments + 1),
       points_(robot.points()) {
   present_.controls.resize(robot.segments);
   trend_.controls.resize(robot.segments);
+}
+
+template <class Model>
+void Branch<Model>::enter(std::span<const Obstacle> obstacles) {
+  newton_.enter(obstacles);
   trend_.mounts.resize(newton_.chain.mounts());
   present_.mounts.resize(newton_.chain.mounts());
   trial_ = present_;
@@ -35,8 +41,10 @@ Branch<Model>::Branch(const Robot& robot, const std::vector<Obstacle>& obstacles
 
 template <class Model>
 std::size_t Branch<Model>::block_size() const {
-  const std::size_t n = present_.controls.size();
-  return 4 + n + 5 * (n + 1) + 2 * newton_.chain.contacts() + 2 * newton_.chain.obstacles().size() + n + 2 * trend_.mounts.size() + kMaxActive;
+  const std::size_t n = present_.controls.size(), contacts = newton_.chain.contacts();
+  const std::size_t obstacles = contacts / newton_.chain.points().size();
+  return 4 + n + 5 * (n + 1) + 2 * contacts + 4 * obstacles + 7 + newton_.chain.points().size() + n + 2 * obstacles +
+         kMaxActive;
 }
 
 template <class Model>
@@ -50,10 +58,10 @@ void Branch<Model>::load(const double* block) {
   block += 3 * (n + 1);
   for (std::size_t i = 0; i <= n; ++i, block += 2) levers_[i] = {{block[0] - nodes_[i][0], block[1] - nodes_[i][1]}};
   const double* displacements = block + 2 * newton_.chain.contacts();
-  for (std::size_t j = 0; j < newton_.chain.obstacles().size(); ++j, displacements += 2) {
-    const int mount = newton_.chain.mount_of(j);
-    if (mount >= 0) present_.mounts[mount] = {{displacements[0], displacements[1]}};
-  }
+  const int obstacles = static_cast<int>(newton_.chain.obstacles().size());
+  for (int j = 0; j < obstacles; ++j)
+    if (const int mount = newton_.chain.mount_of(j); mount >= 0)
+      present_.mounts[mount] = {{displacements[2 * j], displacements[2 * j + 1]}};
   mounts_ = present_.mounts;
   newton_.chain.look_around(nodes_, present_.mounts);
   place_points(newton_.chain.robot(), nodes_, levers_, points_);
@@ -69,9 +77,12 @@ void Branch<Model>::load(const double* block) {
     active.multiplier[active.count++] = tension_ / newton_.chain.robot().stiffness(present_.command.length);
   }
   settled_ = false;
-  const double* trend = displacements;
+  touched_ = newton_.chain.touching(active);
+  onset_ = displacements[4 * obstacles + 3];
+  const double* trend = displacements + 4 * obstacles + 7 + points_.size();
   for (Control& control : trend_.controls) control[0] = *trend++;
-  for (Position& mount : trend_.mounts) mount = {{*trend++, *trend++}};
+  for (int j = 0; j < obstacles; ++j, trend += 2)
+    if (const int mount = newton_.chain.mount_of(j); mount >= 0) trend_.mounts[mount] = {{trend[0], trend[1]}};
   std::copy_n(trend, kMaxActive, trend_.multipliers.begin());
 }
 
@@ -92,13 +103,32 @@ void Branch<Model>::store(double* block) const {
     if (present_.active.contact[j] < chain.contacts()) block[present_.active.contact[j]] = present_.active.multiplier[j];
   block += chain.contacts();
   chain.survey(block);
-  block += chain.contacts();
-  for (std::size_t j = 0; j < chain.obstacles().size(); ++j) {
-    const int mount = chain.mount_of(j);
-    for (int k = 0; k < 2; ++k) *block++ = mount < 0 ? 0.0 : present_.mounts[mount][k];
+  double clearance = std::numeric_limits<double>::infinity();
+  for (int c = 0; c < chain.contacts(); ++c) clearance = std::min(clearance, *block++);
+  const int obstacles = static_cast<int>(chain.obstacles().size());
+  const auto write = [&](const Position& pair) { block = std::copy(pair.v.begin(), pair.v.end(), block); };
+  const auto of_mount = [&](const std::vector<Position>& mounts, int j) {
+    return chain.mount_of(j) < 0 ? Position{} : mounts[chain.mount_of(j)];
+  };
+  for (int j = 0; j < obstacles; ++j) write(of_mount(present_.mounts, j));
+  Position total{};
+  for (int j = 0; j < obstacles; ++j) {
+    const Position force = chain.push(present_.active, j);
+    total += force;
+    write(force);
   }
+  write(total);
+  *block++ = clearance;
+  *block++ = onset_;
+  const Vec<3> slopes = chain.free_slopes(present_.command);
+  block = std::copy(slopes.v.begin(), slopes.v.end(), block);
+  const std::size_t points = chain.points().size();
+  std::fill_n(block, points, 0.0);
+  for (int j = 0; j < present_.active.count; ++j)
+    if (present_.active.contact[j] < chain.contacts()) block[present_.active.contact[j] % points] = 1;
+  block += points;
   for (const Control& control : trend_.controls) *block++ = control[0];
-  for (const Position& mount : trend_.mounts) block = std::copy(mount.v.begin(), mount.v.end(), block);
+  for (int j = 0; j < obstacles; ++j) write(of_mount(trend_.mounts, j));
   std::fill_n(block, kMaxActive, 0.0);
   const auto begin = present_.active.contact.begin(), end = begin + present_.active.count;
   for (int j = 0; j < present_.active.count; ++j) {
@@ -385,21 +415,68 @@ Status Branch<Model>::follow(const Command& target) {
   return Status::kJammed;
 }
 
+// Tension of the free robot where it first touches, between where the step began and where it is.
+template <class Model>
+double Branch<Model>::first_tension(const Command& start) {
+  const auto clear = [&](double part) {
+    trial_.command = between(start, present_.command, part);
+    newton_.chain.relax(trial_);
+    return newton_.chain.evaluate(trial_) && newton_.chain.violation() <= kFeasibility;
+  };
+  double low = 0, high = 1;
+  if (!clear(high))
+    for (int i = 0; i < kOnsetBisections; ++i) {
+      const double middle = (low + high) / 2;
+      (clear(middle) ? low : high) = middle;
+    }
+  clear(high);
+  newton_.chain.reduced_gradient(trial_.active);
+  return newton_.chain.tension(trial_.active);
+}
+
 template <class Model>
 Status Branch<Model>::follow(const double* from, const Command& target, double* to) {
   iterations = 0;
   load(from);
+  const Command start = present_.command;
   if (trace) {
     settle();
     remember();
   }
   const Status status = follow(target);
+  if (!newton_.chain.touching(present_.active)) {
+    onset_ = 0;
+  } else if (!touched_) {
+    onset_ = first_tension(start);
+    settled_ = false;
+  }
   settle();
   store(to);
   return status;
 }
 
+template <class Model>
+bool Branch<Model>::reaches(double force, double increment, double limit, double length) {
+  std::vector<double> block(block_size());
+  block[1] = length;
+  follow(block.data(), {0, length}, block.data());
+  if (newton_.chain.violation() > 0) return false;
+  const int obstacles = static_cast<int>(newton_.chain.obstacles().size());
+  for (int i = 1; i * increment < limit; ++i) {
+    if (follow(block.data(), {i * increment, length}, block.data()) != Status::kConverged) return false;
+    Position total{};
+    for (int j = 0; j < obstacles; ++j) total += newton_.chain.push(present_.active, j);
+    if (newton_.chain.touching(present_.active) && norm(total) >= force) return true;
+  }
+  return false;
+}
+
 template class Branch<UniformCable>;
 template class Branch<SlidingCable>;
+
+std::unique_ptr<Follower> make_follower(bool sliding, const Robot& robot, int obstacles) {
+  if (sliding) return std::make_unique<Branch<SlidingCable>>(robot, obstacles);
+  return std::make_unique<Branch<UniformCable>>(robot, obstacles);
+}
 
 }  // namespace ccr

@@ -41,18 +41,17 @@ void place_points(const Robot& robot, std::span<const Position> nodes, std::span
 }
 
 template <class Model>
-Chain<Model>::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
+Chain<Model>::Chain(const Robot& robot, int obstacles)
     : robot_(robot),
-      obstacles_(obstacles),
       bends_(robot.segments),
       origin_(robot.segments + 1),
-      clear_(obstacles.size()),
+      clear_(obstacles),
       states_(robot.segments + 1),
       nodes_(robot.segments + 1),
       levers_(robot.segments + 1),
       points_(robot.points()),
-      gaps_(obstacles.size() * points_.size() + Model::kSliding, std::numeric_limits<double>::infinity()),
-      mount_of_(obstacles.size(), -1),
+      gaps_(obstacles * points_.size() + Model::kSliding, std::numeric_limits<double>::infinity()),
+      mount_of_(obstacles, -1),
       pulls_(robot.segments + 1),
       adjoints_(robot.segments),
       gradient_(robot.segments) {
@@ -61,16 +60,21 @@ Chain<Model>::Chain(const Robot& robot, const std::vector<Obstacle>& obstacles)
   for (const double line : robot.lines)
     for (int k = 0; k < robot.positions(); ++k)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line / robot.offset});
-  for (std::size_t j = 0; j < obstacles.size(); ++j)
-    if (obstacles[j].mounted) {
-      mount_of_[j] = mounts();
-      springs_.push_back(obstacles[j].stiffness);
-    }
-  mount_origin_.resize(mounts());
-  displacements_.resize(mounts());
-  mount_gradient_.resize(mounts());
   for (const double line : robot.lines) reach_ = std::max(reach_, std::abs(line));
   reach_ += limits::kReach + (robot.between > 0 ? robot.max_length / robot.segments : 0);
+}
+
+template <class Model>
+void Chain<Model>::enter(std::span<const Obstacle> obstacles) {
+  obstacles_ = obstacles;
+  for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
+  near_.clear();
+  int mounts = 0;
+  for (std::size_t j = 0; j < obstacles.size(); ++j) mount_of_[j] = obstacles[j].mounted ? mounts++ : -1;
+  springs_.resize(mounts);
+  mount_origin_.resize(mounts);
+  displacements_.resize(mounts);
+  mount_gradient_.resize(mounts);
 }
 
 template <class Model>
@@ -365,6 +369,52 @@ double Chain<Model>::tension(const ActiveSet& active) const {
     }
     return stiffness() * (slope / robot_.segments);
   }
+}
+
+template <class Model>
+Position Chain<Model>::push(const ActiveSet& active, int obstacle) const {
+  Position force{};
+  for (int j = 0; j < active.count; ++j) {
+    if (active.contact[j] == contacts() || active.contact[j] / static_cast<int>(points_.size()) != obstacle) continue;
+    const Gap gap = this->gap(active.contact[j]);
+    force[0] += stiffness() * active.multiplier[j] * gap.x;
+    force[1] += stiffness() * active.multiplier[j] * gap.y;
+  }
+  return force;
+}
+
+// All segments have the same shape: the sums over their directions (i + 1/2) θ are taken by turning one of them on.
+template <class Model>
+Vec<3> Chain<Model>::free_slopes(const Command& command) const {
+  const int n = robot_.segments;
+  const double length = command.length / n;
+  Iterate one;
+  one.controls.resize(1);
+  one.command = command;
+  relax(one);
+  typename Model::Bends bends(1);
+  Model::bend(1, one.controls[0].v.data(), command.cable / n, length, robot_.offset, bends);
+  const auto bend = bends[0];
+  double turn, stretch = 0;  // slopes of the angle and of the logarithm of the chord
+  if constexpr (Model::kSliding) {
+    turn = 1 / (n * bend.taken_slope);
+    stretch = bend.stretch * turn;
+  } else {
+    turn = bend.pull_slope / n;
+  }
+  const double chord = length * std::sqrt(bend.forward * bend.forward + bend.sideways * bend.sideways);
+  double cosine = std::cos(bend.angle / 2), sine = std::sin(bend.angle / 2);
+  Vec<3> slopes{};
+  for (int i = 0; i < n; ++i) {
+    const double swing = (i + 0.5) * turn;
+    slopes[0] += chord * (stretch * sine + swing * cosine);
+    slopes[1] += chord * (stretch * cosine - swing * sine);
+    const double next = cosine * bend.cosine - sine * bend.sine;
+    sine = sine * bend.cosine + cosine * bend.sine;
+    cosine = next;
+  }
+  slopes[2] = -n * turn;
+  return slopes;
 }
 
 template class Chain<UniformCable>;

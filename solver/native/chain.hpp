@@ -111,7 +111,11 @@ class Chain {
     }
   };
 
-  Chain(const Robot& robot, const std::vector<Obstacle>& obstacles);
+  // For scenes of this many obstacles.
+  Chain(const Robot& robot, int obstacles);
+
+  // Goes among the obstacles of a scene, which must stay where they are while the chain is.
+  void enter(std::span<const Obstacle> obstacles);
 
   // Measures how far each obstacle is from a shape, so that it can be passed over while the robot stays close to it.
   void look_around(std::span<const Position> nodes, const std::vector<Position>& mounts);
@@ -127,10 +131,14 @@ class Chain {
   // Exact Hessian of the Lagrangian, and the tension of the cable; both follow reduced_gradient.
   void curvature(const ActiveSet& active, System& system) const;
   double tension(const ActiveSet& active) const;
+  Position push(const ActiveSet& active, int obstacle) const;  // its force on the robot [N]
+
+  // Slopes of the tip's pose in the cable displacement of a robot that nothing touches (eq. 7).
+  Vec<3> free_slopes(const Command& command) const;
 
   const Robot& robot() const { return robot_; }
-  const std::vector<Obstacle>& obstacles() const { return obstacles_; }
-  int contacts() const { return static_cast<int>(obstacles_.size() * points_.size()); }
+  std::span<const Obstacle> obstacles() const { return obstacles_; }
+  int contacts() const { return static_cast<int>(mount_of_.size() * points_.size()); }
   bool touching(const ActiveSet& active) const;  // any obstacle
 
   double objective() const { return objective_; }
@@ -172,7 +180,7 @@ class Chain {
   void measure_gaps(double slack);
 
   Robot robot_;
-  std::vector<Obstacle> obstacles_;
+  std::span<const Obstacle> obstacles_;
   double reach_ = 0;  // from a node, within which its points may be near an obstacle
   double pull_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
   double objective_ = 0, energy_ = 0, steepest_ = 0;

@@ -50,6 +50,8 @@ inline constexpr double kSweepStride = 0.5;    // this often: fractions of the s
 inline constexpr int kSubSteps = 400;          // beside those of the largest size
 inline constexpr int kBranchEnds = 24;         // ends met in one step before the robot counts as jammed
 
+inline constexpr int kOnsetBisections = 20;    // to find where a contact began
+
 // Stall: the cable stops where the tension is within this fraction below its limit.
 inline constexpr double kTensionBand = 1e-6;
 inline constexpr double kYield = 0.02;         // cable displacement a motor gives at a time when it cannot hold

@@ -8,14 +8,24 @@ namespace ccr {
 using namespace limits;
 
 template <class Model>
-Newton<Model>::Newton(const Robot& robot, const std::vector<Obstacle>& obstacles)
+Newton<Model>::Newton(const Robot& robot, int obstacles)
     : chain(robot, obstacles),
-      hessian_(robot.segments, chain.mounts()),
-      contacts_(robot.segments, chain.mounts()),
-      step_(robot.segments, chain.mounts()),
+      hessian_(robot.segments, 0),
+      contacts_(robot.segments, 0),
+      step_(robot.segments, 0),
       correction_(step_) {
   trial_.controls.resize(robot.segments);
-  trial_.mounts.resize(chain.mounts());
+}
+
+template <class Model>
+void Newton<Model>::enter(std::span<const Obstacle> obstacles) {
+  chain.enter(obstacles);
+  const int segments = chain.robot().segments, mounts = chain.mounts();
+  if (step_.mounts.size() == static_cast<std::size_t>(mounts)) return;
+  hessian_ = Hessian<Model>(segments, mounts);
+  contacts_ = Contacts<Model>(segments, mounts);
+  step_ = correction_ = Direction<Model>(segments, mounts);
+  trial_.mounts.resize(mounts);
 }
 
 template <class Model>

@@ -17,7 +17,8 @@ struct Verdict {
 template <class Model>
 class Newton {
  public:
-  Newton(const Robot& robot, const std::vector<Obstacle>& obstacles);
+  Newton(const Robot& robot, int obstacles);
+  void enter(std::span<const Obstacle> obstacles);
 
   // Iteration with an l1 merit search: quadratic, for a start close to a stable equilibrium. Gives up where the
   // curvature along the active gaps is not positive.

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from solver import Capsule, Circle, Ellipse, Equilibrium, HalfPlane, Polygon, Robot, Scene, Solver
-from solver.forces import Onset, VirtualWork, force_true
+from solver.forces import VirtualWork, force_true, onset_tension
 from solver.formulation import node_derivatives
 from solver.free import fitted_slopes, tip_slopes
+from solver.layout import TENSION, layout
 from solver.robot import CABLES
 
 SCENES = [
@@ -31,16 +32,15 @@ EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
 
 def pulled(scene: Scene, cable_mm: float, step: float = 0.25, cable: str = "uniform"):
     solver = Solver(replace(Robot.prototype(max_tension=math.inf), cable=cable), scene)
-    before, now, onset = solver.rest(), solver.rest(), Onset()
+    now = solver.rest()
     while now.cable_mm < cable_mm - 1e-9:
-        before, now = now, solver.step(now, min(now.cable_mm + step, cable_mm))
-        onset = onset.after(before, now)
-    return solver, now, onset
+        now = solver.step(now, min(now.cable_mm + step, cable_mm))
+    return solver, now
 
 
 @EVERY_SCENE
 def test_force_is_stiffness_times_multiplier(scene):
-    _, equilibrium, _ = pulled(scene, 9.0)
+    _, equilibrium = pulled(scene, 9.0)
     for force, multipliers in zip(force_true(equilibrium), equilibrium.multipliers, strict=True):
         assert np.linalg.norm(force) <= equilibrium.stiffness * multipliers.sum() * (1 + 1e-12)
     assert np.linalg.norm(force_true(equilibrium).sum(axis=0)) > 0
@@ -50,7 +50,7 @@ def test_force_is_stiffness_times_multiplier(scene):
 @EVERY_SCENE
 def test_work_of_tension_and_contact_is_the_change_of_energy(cable, scene):
     """B(∂J/∂q·q' + ∂J/∂l) = T + Σ F_j·x_j' for any admissible direction (q', 1), in node coordinates."""
-    _, equilibrium, _ = pulled(scene, 9.0, cable=cable)
+    _, equilibrium = pulled(scene, 9.0, cable=cable)
     robot, n = equilibrium.robot, equilibrium.robot.segments
     unknowns, parameters, _, _ = equilibrium.node_solution()
     slope, _, held, _, gaps = (
@@ -74,69 +74,93 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(cable, scene):
 @EVERY_CABLE
 @EVERY_SCENE
 def test_tension_is_the_slope_of_the_energy_along_the_branch(cable, scene):
-    solver, equilibrium, _ = pulled(scene, 9.1, cable=cable)
+    solver, equilibrium = pulled(scene, 9.1, cable=cable)
     ahead, behind = (solver.step(equilibrium, equilibrium.cable_mm + h) for h in (1e-4, -1e-4))
     slope = (ahead.energy - behind.energy) / 2e-4
     assert slope == pytest.approx(equilibrium.tension, rel=1e-6)
 
 
+@EVERY_CABLE
+@EVERY_SCENE
+def test_kernel_reads_forces_slopes_and_onset(cable, scene):
+    """As they follow from the multipliers, the closed form of the free robot, and the way there."""
+    robot = replace(Robot.prototype(), cable=cable, length_range_mm=(150, 200))
+    solver = Solver(robot, scene)
+    now = solver.rest()
+    for pulled_to, length in [(2.0, 180), (4.0, 181), (6.0, 182), (9.0, 180), (5.0, 179), (1.0, 180)]:
+        before, now = now, solver.step(now, pulled_to, length)
+        forces = np.zeros((len(scene), 2))
+        for j, line, position in np.argwhere(now.contact):
+            normal = scene.obstacles[j].normal_at(now.points[line, position] - now.displacements[j])
+            forces[j] += now.stiffness * now.multipliers[j, line, position] * normal
+        assert now.forces == pytest.approx(forces, abs=1e-12)
+        places = layout(robot, len(scene))
+        assert places.force(now.block) == pytest.approx(forces.sum(axis=0), abs=1e-12)
+        assert places.clearance(now.block)[0] == now.gaps.min()
+        assert np.array_equal(places.flags(now.block), now.contact.any(axis=0).ravel())
+        assert now.tip_slopes == pytest.approx(tip_slopes(robot.at(length), now.cable_mm), rel=1e-10)
+        assert now.onset_tension == pytest.approx(onset_tension(before, now), rel=1e-5)
+
+
 def test_onset_does_not_depend_on_the_increment():
-    onsets = [pulled(SCENES[2], 6.0, step)[2].tension for step in (0.05, 0.25, 0.5)]
+    onsets = [pulled(SCENES[2], 6.0, step)[1].onset_tension for step in (0.05, 0.25, 0.5)]
     assert onsets == pytest.approx([onsets[0]] * 3, rel=1e-6)
 
 
 def test_onset_is_forgotten_when_contact_ends():
-    solver, equilibrium, onset = pulled(SCENES[0], 7.0)
-    assert onset.tension is not None
+    solver, equilibrium = pulled(SCENES[0], 7.0)
+    assert equilibrium.onset_tension > 0
     released = solver.step(equilibrium, 2.0)
-    assert onset.after(equilibrium, released) == Onset()
-    assert not VirtualWork().estimate(released, Onset()).any()
+    assert released.onset_tension == 0
+    assert not VirtualWork().estimate(released).any()
     assert not force_true(released).any()
 
 
 def test_estimate_on_a_wall_is_equation_11():
-    _, equilibrium, onset = pulled(SCENES[2], 7.0)
+    _, equilibrium = pulled(SCENES[2], 7.0)
     x, y, turn = tip_slopes(equilibrium.robot, equilibrium.cable_mm)
-    load = equilibrium.tension - onset.tension
+    load = equilibrium.tension - equilibrium.onset_tension
     for friction in (0.0, 0.4):
         horizontal = equilibrium.robot.offset_mm * load * turn / (friction * y + x)
-        force = VirtualWork(friction).estimate(equilibrium, onset)[0]
+        force = VirtualWork(friction).estimate(equilibrium)[0]
         assert force == pytest.approx([horizontal, friction * horizontal])
     assert horizontal < 0  # the wall pushes the robot back
 
 
 @EVERY_SCENE
 def test_estimate_knows_nothing_of_the_material(scene):
-    _, equilibrium, onset = pulled(scene, 8.0)
+    _, equilibrium = pulled(scene, 8.0)
     stiffer = replace(equilibrium.robot, rigidity=3 * equilibrium.robot.rigidity)
     springs = (None if o.stiffness is None else 3 * o.stiffness_matrix for o in scene)
     scaled = Scene(replace(o, stiffness=k) for o, k in zip(scene, springs, strict=True))
     block = equilibrium.block.copy()
-    block[2] *= 3
+    places = layout(stiffer, len(scene))
+    for scaling in (lambda block: block[TENSION : TENSION + 1], places.onset, places.forces, places.force):
+        scaling(block)[:] *= 3
     same = Equilibrium(stiffer, scaled, block, equilibrium.status, 0)
-    estimate = VirtualWork().estimate(equilibrium, onset)
+    estimate = VirtualWork().estimate(equilibrium)
     assert estimate.any()
-    assert VirtualWork().estimate(same, Onset(3 * onset.tension)) == pytest.approx(3 * estimate, rel=1e-12)
+    assert VirtualWork().estimate(same) == pytest.approx(3 * estimate, rel=1e-12)
     assert max(same.residuals()) < 1e-8
 
 
 def test_estimate_with_straight_line_slopes():
-    _, equilibrium, onset = pulled(SCENES[2], 7.0)
+    _, equilibrium = pulled(SCENES[2], 7.0)
     fitted = VirtualWork(0.4, fit_range_mm=(0.0, 8.0))
     x, y, turn = fitted_slopes(equilibrium.robot, 0.0, 8.0)
-    horizontal = equilibrium.robot.offset_mm * (equilibrium.tension - onset.tension) * turn / (0.4 * y + x)
-    assert fitted.estimate(equilibrium, onset)[0] == pytest.approx([horizontal, 0.4 * horizontal])
-    narrow = VirtualWork(0.4, fit_range_mm=(6.999, 7.001)).estimate(equilibrium, onset)
-    assert narrow == pytest.approx(VirtualWork(0.4).estimate(equilibrium, onset), rel=1e-6)
+    horizontal = equilibrium.robot.offset_mm * (equilibrium.tension - equilibrium.onset_tension) * turn / (0.4 * y + x)
+    assert fitted.estimate(equilibrium)[0] == pytest.approx([horizontal, 0.4 * horizontal])
+    narrow = VirtualWork(0.4, fit_range_mm=(6.999, 7.001)).estimate(equilibrium)
+    assert narrow == pytest.approx(VirtualWork(0.4).estimate(equilibrium), rel=1e-6)
 
 
 def test_estimate_shares_one_load_among_several_contacts():
     """The work of all estimated forces on the free tip is that of the load, and each follows its multipliers."""
-    _, equilibrium, onset = pulled(SCENES[1], 5.0, step=0.05)
-    forces, energy = VirtualWork().estimate(equilibrium, onset), force_true(equilibrium)
+    _, equilibrium = pulled(SCENES[1], 5.0, step=0.05)
+    forces, energy = VirtualWork().estimate(equilibrium), force_true(equilibrium)
     assert np.all(np.linalg.norm(forces, axis=1) > 0)
     slopes = tip_slopes(equilibrium.robot, equilibrium.cable_mm)
-    load = equilibrium.tension - onset.tension
+    load = equilibrium.tension - equilibrium.onset_tension
     assert (forces @ slopes[:2]).sum() == pytest.approx(equilibrium.robot.offset_mm * load * slopes[2])
     ratio = forces[energy != 0] / energy[energy != 0]
     assert ratio == pytest.approx(ratio[0], rel=1e-9)

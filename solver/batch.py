@@ -1,0 +1,111 @@
+"""Many robots alike, each in a scene of its own, moved by one call of the kernel."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solver import _kernel
+from solver.equilibrium import Equilibrium
+from solver.layout import CABLE, LENGTH, layout
+from solver.robot import Robot
+from solver.scene import Scene
+from solver.solve import check_width, kernel_robot, kernel_scene
+from solver.status import Status
+
+
+class BatchSolver:
+    """Moves many robots at once; each is moved as :class:`solver.Solver` would, bit for bit.
+
+    Unlike the solver it keeps the present equilibria, as rows of arrays that are written in place.
+
+    Attributes:
+        blocks: Equilibria, ``(N, size)``; :attr:`layout` tells where their numbers stand.
+        statuses: How the last step of each ended, values of :class:`solver.Status`, ``(N,)``.
+        iterations: Newton iterations of these steps, ``(N,)``.
+
+    Args:
+        robot: What all robots are.
+        count: Number N of robots.
+        obstacles: Number of obstacles of every scene.
+        threads: Threads that share the work; the answer does not depend on them.
+
+    Raises:
+        ValueError: If a number is not positive.
+    """
+
+    def __init__(self, robot: Robot, count: int, obstacles: int, threads: int = 1) -> None:
+        for name, value in (("count", count), ("threads", threads)):
+            if not (isinstance(value, int) and value > 0):
+                raise ValueError(f"{name} is {value!r}; it must be a positive whole number")
+        self.robot, self.count = robot, count
+        self.layout = layout(robot, obstacles)
+        self.blocks = np.zeros((count, self.layout.size))
+        self.statuses = np.zeros(count, np.intc)
+        self.iterations = np.zeros(count, np.intc)
+        self._scenes: list[Scene | None] = [None] * count
+        self._commands = np.zeros((count, 2))
+        self._fleet = _kernel.Fleet(robot.cable == "sliding", kernel_robot(robot), count, obstacles, threads)
+        self._all = list(range(count))
+
+    def assign(self, index: int, scene: Scene) -> None:
+        """Put a robot, straight and unactuated, among other obstacles.
+
+        Raises:
+            ValueError: If an obstacle is narrow enough to slip between its points or names a node it does not have.
+        """
+        check_width(self.robot, scene)
+        self._fleet.assign(index, kernel_scene(self.robot, scene))
+        self._scenes[index] = scene
+
+    def rest(self, robots: Sequence[int]) -> None:
+        """Make some robots straight and unactuated again."""
+        self.blocks[robots] = 0.0
+        self.blocks[robots, LENGTH] = self.robot.length_mm
+        self._commands[robots] = 0.0, self.robot.length_mm
+        self._move(list(robots))
+
+    def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
+        """Move the cables of all robots, or of some, as far as tension and obstacles allow.
+
+        Args:
+            cable_mm: Commanded cable displacement of each of them, ``(k,)`` [mm].
+            robots: Which; ``None`` for all.
+
+        Raises:
+            ValueError: If a command is out of range; nothing has moved then.
+        """
+        if not ((cable_mm >= 0) & (cable_mm <= self.robot.cable_limit_mm)).all():
+            raise ValueError(f"cable_mm is {cable_mm}; all must be from 0 to {self.robot.cable_limit_mm:.6g}")
+        if robots is None:
+            self._commands[:, CABLE] = cable_mm
+            self._move(self._all)
+        else:
+            self._commands[robots, CABLE] = cable_mm
+            self._move(list(robots))
+
+    def reaches(self, robots: Sequence[int], forces: np.ndarray, increment_mm: float, limit_mm: float) -> np.ndarray:
+        """Whether pulling some robots steadily from rest gets each to a contact force, ``(k,)`` bool.
+
+        No step may end in anything but ``CONVERGED``, and the straight robot must be clear of the obstacles.
+
+        Args:
+            robots: Which, assigned to their scenes; their states are left alone.
+            forces: Force for each, ``(k,)`` [N].
+            increment_mm: Cable displacement of a step [mm].
+            limit_mm: Bound on the cable displacement [mm].
+        """
+        length = self.robot.length_mm
+        return np.array(
+            self._fleet.reaches(list(robots), np.asarray(forces, float), increment_mm, limit_mm, length), bool
+        )
+
+    def equilibrium(self, index: int) -> Equilibrium:
+        """A robot's present equilibrium, on its own."""
+        scene = self._scenes[index]
+        if scene is None:
+            raise ValueError(f"robot {index} has not been assigned to a scene")
+        status, iterations = Status(self.statuses[index]), int(self.iterations[index])
+        return Equilibrium(self.robot, scene, self.blocks[index].copy(), status, iterations)
+
+    def _move(self, robots: list[int]) -> None:
+        self._fleet.step(robots, self._commands, self.blocks, self.statuses, self.iterations)
