@@ -1,9 +1,12 @@
 """The registered environments."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 from ccr_gym.env import ContactEnv
 from ccr_gym.tasks import LoadCell, PushObstacle
+from ccr_gym.vector_env import ContactVectorEnv
+
+TaskType = TypeVar("TaskType")
 
 
 class LoadCellEnv(ContactEnv):
@@ -53,8 +56,8 @@ class LoadCellEnv(ContactEnv):
     the set-point), `reward_terms`.
 
     ## Arguments
-    All those of `ContactEnv`, and `task`: `LoadCell` or a mapping of its fields; mappings make every
-    argument JSON-able.
+    `render_mode`, the fields of `ccr_gym.settings.Settings`, and `task`: `LoadCell` or a mapping of its fields;
+    mappings make every argument JSON-able.
 
     ## Version History
     * v0: initial version.
@@ -62,7 +65,15 @@ class LoadCellEnv(ContactEnv):
 
     def __init__(self, task: LoadCell | dict[str, Any] | None = None, **kwargs: Any) -> None:
         """See the class; `kwargs` are those of `ContactEnv`."""
-        super().__init__(LoadCell(**task) if isinstance(task, dict) else task or LoadCell(), **kwargs)
+        super().__init__(_of(LoadCell, task), **kwargs)
+
+
+class LoadCellVectorEnv(ContactVectorEnv):
+    """Many `LoadCellEnv`, moved by one call of the solver."""
+
+    def __init__(self, task: LoadCell | dict[str, Any] | None = None, **kwargs: Any) -> None:
+        """See `LoadCellEnv`; `kwargs` are those of `ContactVectorEnv`."""
+        super().__init__(_of(LoadCell, task), **kwargs)
 
 
 class PushObstacleEnv(ContactEnv):
@@ -113,8 +124,8 @@ class PushObstacleEnv(ContactEnv):
     the set-point), `reward_terms`.
 
     ## Arguments
-    All those of `ContactEnv`, and `task`: `PushObstacle` or a mapping of its fields; mappings make every
-    argument JSON-able.
+    `render_mode`, the fields of `ccr_gym.settings.Settings`, and `task`: `PushObstacle` or a mapping of its fields;
+    mappings make every argument JSON-able.
 
     ## Version History
     * v0: initial version.
@@ -122,4 +133,17 @@ class PushObstacleEnv(ContactEnv):
 
     def __init__(self, task: PushObstacle | dict[str, Any] | None = None, **kwargs: Any) -> None:
         """See the class; `kwargs` are those of `ContactEnv`."""
-        super().__init__(PushObstacle(**task) if isinstance(task, dict) else task or PushObstacle(), **kwargs)
+        super().__init__(_of(PushObstacle, task), **kwargs)
+
+
+class PushObstacleVectorEnv(ContactVectorEnv):
+    """Many `PushObstacleEnv`, moved by one call of the solver."""
+
+    def __init__(self, task: PushObstacle | dict[str, Any] | None = None, **kwargs: Any) -> None:
+        """See `PushObstacleEnv`; `kwargs` are those of `ContactVectorEnv`."""
+        super().__init__(_of(PushObstacle, task), **kwargs)
+
+
+def _of(kind: type[TaskType], task: Any) -> TaskType:
+    """A task, from one, a mapping of its fields, or nothing."""
+    return kind(**task) if isinstance(task, dict) else task or kind()

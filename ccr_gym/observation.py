@@ -1,33 +1,13 @@
-"""The observation: what is seen, how it is scaled, and its flat form."""
-
-import math
-from typing import NamedTuple
+"""The observation: what is seen, how it is scaled, and its flat form. All of it in whole arrays over environments."""
 
 import numpy as np
 from gymnasium import spaces
 
-from solver import Equilibrium, Robot
+from solver import Robot
+from solver.layout import CABLE, Layout
 
 FORCE_SCALE_N = 0.5  # force that an observation of 1 stands for
 SENSOR_KEYS = ("force_error", "force_measured")  # seen with a force sensor only
-
-
-class Reading(NamedTuple):
-    """What the sensors say at one instant, in physical units.
-
-    Attributes:
-        equilibrium: Source of node poses, contact flags and cable displacement.
-        force_measured: Contact force on the robot as a force sensor gives it, ``(2,)`` [N].
-        force_est: The same by virtual work, ``(2,)`` [N].
-        desired_force: Set-point [N].
-        cable_limit_mm: Full scale of the cable displacement [mm].
-    """
-
-    equilibrium: Equilibrium
-    force_measured: np.ndarray
-    force_est: np.ndarray
-    desired_force: float
-    cable_limit_mm: float
 
 
 def dict_space(robot: Robot, force_sensor: bool) -> spaces.Dict:
@@ -46,43 +26,60 @@ def dict_space(robot: Robot, force_sensor: bool) -> spaces.Dict:
 
 
 class Observer:
-    """Writes readings as scaled float32 vectors within the bounds of their space.
+    """Writes what is seen as scaled float32 rows within the bounds of their space.
 
     Args:
         robot: The robot.
+        layout: Where its numbers stand in a block.
         force_sensor: Whether the measured force is seen.
+        cable_limit_mm: Full scale of the cable displacement [mm].
     """
 
-    def __init__(self, robot: Robot, force_sensor: bool) -> None:
+    def __init__(self, robot: Robot, layout: Layout, force_sensor: bool, cable_limit_mm: float) -> None:
         self.dict_space = dict_space(robot, force_sensor)
         boxes = [box for box in self.dict_space.values() if isinstance(box, spaces.Box)]
-        low, high = (np.concatenate([getattr(box, end) for box in boxes]) for end in ("low", "high"))
-        self.flat_space = spaces.Box(low, high)
+        self._low, self._high = (np.concatenate([getattr(box, end) for box in boxes]) for end in ("low", "high"))
+        self.flat_space = spaces.Box(self._low, self._high)
         ends = np.cumsum([box.shape[0] for box in boxes]).tolist()
         self._places = {
             key: slice(end - box.shape[0], end) for key, box, end in zip(self.dict_space, boxes, ends, strict=True)
         }
-        self._pose_scale = (robot.length_mm, robot.length_mm, np.pi)
+        numbers = np.arange(layout.size)
+        pose_scale = 1 / np.array([robot.lengths_mm[1], robot.lengths_mm[1], np.pi])
+        seen: dict[str, tuple[np.ndarray, np.ndarray | float]] = {  # what is a number of the block, and its scale
+            "cable": (numbers[[CABLE]], 1 / cable_limit_mm),
+            "contact": (layout.flags(numbers), 1.0),
+            "force_measured": (layout.force(numbers), 1 / FORCE_SCALE_N),
+            "nodes": (layout.nodes(numbers).ravel(), np.tile(pose_scale, robot.segments + 1)),
+        }
+        self._source, self._scale = np.zeros(self._low.size, int), np.zeros(self._low.size)
+        for key, (source, scale) in seen.items():
+            if key in self._places:
+                self._source[self._places[key]], self._scale[self._places[key]] = source, scale
         self._force_sensor = force_sensor
 
-    def flat(self, reading: Reading) -> np.ndarray:
-        """The flat form, ``(k,)`` float32."""
-        equilibrium, at = reading.equilibrium, self._places
-        vector = np.empty(self.flat_space.shape, np.float32)
-        vector[at["cable"]] = equilibrium.cable_mm / reading.cable_limit_mm
-        vector[at["contact"]] = equilibrium.contact.any(axis=0).ravel()
-        vector[at["desired_force"]] = reading.desired_force / FORCE_SCALE_N
-        vector[at["force_est"]] = reading.force_est / FORCE_SCALE_N
-        vector[at["nodes"]] = (equilibrium.nodes / self._pose_scale).ravel()
-        if self._force_sensor:
-            vector[at["force_error"]] = (reading.desired_force - math.hypot(*reading.force_measured)) / FORCE_SCALE_N
-            vector[at["force_measured"]] = reading.force_measured / FORCE_SCALE_N
-        return np.clip(vector, self.flat_space.low, self.flat_space.high, out=vector)
+    def flat(self, blocks: np.ndarray, force: np.ndarray, force_est: np.ndarray, desired: np.ndarray) -> np.ndarray:
+        """The flat form, ``(N, k)`` float32.
 
-    def entries(self, reading: Reading) -> dict[str, np.ndarray]:
-        """The dictionary form, views of one vector."""
-        vector = self.flat(reading)
-        return {key: vector[place] for key, place in self._places.items()}
+        Args:
+            blocks: Equilibria, ``(N, size)``.
+            force: Magnitude of the measured force, ``(N,)`` [N].
+            force_est: Estimated force on the robot, ``(N, 2)`` [N].
+            desired: Set-points, ``(N,)`` [N].
+        """
+        rows, at = blocks[:, self._source], self._places
+        rows *= self._scale
+        rows[:, at["desired_force"].start] = desired / FORCE_SCALE_N
+        rows[:, at["force_est"]] = force_est / FORCE_SCALE_N
+        if self._force_sensor:
+            rows[:, at["force_error"].start] = (desired - force) / FORCE_SCALE_N
+        np.maximum(rows, self._low, out=rows)
+        np.minimum(rows, self._high, out=rows)
+        return np.asarray(rows, np.float32)
+
+    def entries(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """The dictionary form of flat rows ``(..., k)``, as views."""
+        return {key: rows[..., place] for key, place in self._places.items()}
 
 
 def _box(low: float, shape: tuple[int, ...]) -> spaces.Box:

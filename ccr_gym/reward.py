@@ -1,11 +1,9 @@
-"""The reward: named terms, then their weighted sum. Works on scalars and on arrays over environments alike."""
+"""The reward: named terms, and their sum, in whole arrays over environments."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
+from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
-
-Reals = npt.NDArray[np.float64] | np.float64
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,30 +25,36 @@ class RewardWeights:
     effort: float = 0.02
 
 
+TERMS = tuple(field.name for field in fields(RewardWeights))
+
+
 def reward_terms(
-    weights: RewardWeights,
-    force: Reals,
-    desired: Reals,
-    clearance: Reals,
-    touching: npt.NDArray[np.bool_] | np.bool_,
-    action: Reals,
-) -> dict[str, Reals]:
-    """Weighted terms whose sum is the reward.
+    weights: RewardWeights, force: np.ndarray, desired: np.ndarray, clearance: np.ndarray, action: np.ndarray
+) -> np.ndarray:
+    """Weighted terms in the order of :data:`TERMS`, whose sum is the reward, ``(5, N)``.
 
     Args:
         weights: Their weights.
-        force: Contact force magnitude [N].
-        desired: Desired force [N].
-        clearance: Smallest gap [mm].
-        touching: Whether anything touches.
-        action: Normalised cable increment in [−1, 1].
+        force: Magnitude of the contact force, zero where nothing touches, ``(N,)`` [N].
+        desired: Desired force, ``(N,)`` [N].
+        clearance: Smallest gap, ``(N,)`` [mm].
+        action: Normalised cable increment in [−1, 1], ``(N,)``.
     """
-    error = np.abs(force - desired) / desired
-    terms = {
-        "force_error": -np.minimum(error, 1.0),
-        "accuracy": np.exp(-error / 0.05),
-        "overshoot": -np.minimum(np.maximum(force / desired - 1.0, 0.0), 1.0),
-        "approach": -np.minimum(np.maximum(clearance, 0.0), 100.0) / 100.0 * ~touching,
-        "effort": -action * action,
-    }
-    return {name: getattr(weights, name) * term for name, term in terms.items()}
+    excess = force / desired - 1.0
+    error = np.abs(excess)
+    terms = np.empty((len(TERMS), len(force)))
+    np.minimum(error, 1.0, out=terms[0])
+    np.exp(-20.0 * error, out=terms[1])
+    np.minimum(np.maximum(excess, 0.0), 1.0, out=terms[2])
+    np.minimum(np.maximum(clearance, 0.0) / 100.0, 1.0, out=terms[3])
+    terms[3][force > 0] = 0.0
+    np.multiply(action, action, out=terms[4])
+    terms *= _signed(weights)
+    return terms
+
+
+@lru_cache(maxsize=16)
+def _signed(weights: RewardWeights) -> np.ndarray:
+    """The weights with the signs of their terms, ``(5, 1)``."""
+    signs = {"accuracy": 1.0}
+    return np.array([[signs.get(name, -1.0) * weight] for name, weight in zip(TERMS, astuple(weights), strict=True)])

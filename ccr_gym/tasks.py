@@ -1,30 +1,36 @@
 """What an episode asks: the obstacles and the force to push them with."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
-from solver.forces import force_true
-from solver.free import clearance
+from solver import Circle, HalfPlane, Robot, Scene
+from solver.batch import BatchSolver
 
 MAX_DRAWS = 1000
 PROBE_MM = 0.5  # cable displacement between the equilibria of a trial pull
 
 
 class Assignment(NamedTuple):
-    """One episode's task: a solver of its scene and the force set-point [N]."""
+    """One episode's task: its scene and the force set-point [N]."""
 
-    solver: Solver
+    scene: Scene
     desired_force: float
 
 
 class Task(Protocol):
-    """A distribution over assignments."""
+    """A distribution over assignments.
 
-    def draw(self, robot: Robot, generator: np.random.Generator) -> tuple[Scene, float]:
-        """A scene and a desired force [N]."""
+    Attributes:
+        obstacles: Number of obstacles of every scene.
+    """
+
+    obstacles: ClassVar[int]
+
+    def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
+        """A scene and a desired force."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +43,18 @@ class LoadCell:
         force_n: Range of the desired force [N].
     """
 
+    obstacles: ClassVar[int] = 1
+
     distance_mm: tuple[float, float] = (24.0, 51.0)
     height_mm: float = 127.0
     force_n: tuple[float, float] = (0.01, 0.06)
 
-    def draw(self, robot: Robot, generator: np.random.Generator) -> tuple[Scene, float]:
-        """A scene and a desired force [N]."""
+    def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
+        """A scene and a desired force."""
         node = round(14 / 18 * robot.segments)
         distance = generator.uniform(*self.distance_mm)
         wall = HalfPlane(point=(distance, self.height_mm), normal=(-1.0, 0.0), nodes=(node,))
-        return Scene([wall]), generator.uniform(*self.force_n)
+        return Assignment(Scene([wall]), generator.uniform(*self.force_n))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,43 +68,54 @@ class PushObstacle:
         force_n: Range of the desired force [N].
     """
 
+    obstacles: ClassVar[int] = 1
+
     x_mm: tuple[float, float] = (35.0, 75.0)
     y_mm: tuple[float, float] = (75.0, 150.0)
     radius_mm: tuple[float, float] = (10.0, 16.0)
     force_n: tuple[float, float] = (0.02, 0.15)
 
-    def draw(self, robot: Robot, generator: np.random.Generator) -> tuple[Scene, float]:
-        """A scene and a desired force [N]."""
+    def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
+        """A scene and a desired force."""
         x, y = generator.uniform(*self.x_mm), generator.uniform(*self.y_mm)
         circle = Circle(center=(x, y), radius=generator.uniform(*self.radius_mm))
-        return Scene([circle]), generator.uniform(*self.force_n)
+        return Assignment(Scene([circle]), generator.uniform(*self.force_n))
 
 
-def assign(task: Task, robot: Robot, cable_limit_mm: float, generator: np.random.Generator) -> Assignment:
-    """Draw until the desired force can be reached by pulling steadily, without a stall, jam or snap on the way.
+def assign(
+    task: Task,
+    solver: BatchSolver,
+    robots: Sequence[int],
+    generators: Sequence[np.random.Generator],
+    cable_limit_mm: float,
+    desired: np.ndarray,
+) -> None:
+    """Give some robots scenes and desired forces, each drawn by its own generator.
+
+    Draws again until the force can be reached by pulling steadily, without a stall, jam or snap on the way.
+
+    Args:
+        task: Where scenes and forces are drawn from.
+        solver: The robots; those named are assigned to their scenes.
+        robots: Which.
+        generators: One for each of them.
+        cable_limit_mm: Largest cable displacement that may be needed [mm].
+        desired: Desired force of every robot of the solver, written in place, ``(N,)`` [N].
 
     Raises:
         RuntimeError: If no draw of many is feasible: the task and the robot do not fit.
     """
+    waiting = list(zip(robots, generators, strict=True))
     for _ in range(MAX_DRAWS):
-        scene, force = task.draw(robot, generator)
-        if clearance(robot, scene, 0.0) <= 0:
-            continue
-        solver = Solver(robot, scene)
-        if _reachable(solver, force, cable_limit_mm):
-            return Assignment(solver, force)
+        for robot, generator in waiting:
+            scene, desired[robot] = task.draw(solver.robot, generator)
+            solver.assign(robot, scene)
+        names = [robot for robot, _ in waiting]
+        found = solver.reaches(names, desired[names], PROBE_MM, cable_limit_mm)
+        waiting = [pair for pair, reached in zip(waiting, found, strict=True) if not reached]
+        if not waiting:
+            return
     raise RuntimeError(
         f"none of {MAX_DRAWS} draws of {task} can be pushed as desired within {cable_limit_mm} mm of cable; "
         "widen the task's ranges or the cable limit"
     )
-
-
-def _reachable(solver: Solver, force: float, cable_limit_mm: float) -> bool:
-    equilibrium = solver.rest()
-    for cable in np.arange(PROBE_MM, cable_limit_mm, PROBE_MM):
-        equilibrium = solver.step(equilibrium, float(cable))
-        if equilibrium.status is not Status.CONVERGED:
-            return False
-        if equilibrium.contact.any() and np.linalg.norm(force_true(equilibrium).sum(axis=0)) >= force:
-            return True
-    return False

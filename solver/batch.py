@@ -1,12 +1,14 @@
 """Many robots alike, each in a scene of its own, moved by one call of the kernel."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from solver import _kernel
 from solver.equilibrium import Equilibrium
 from solver.layout import CABLE, LENGTH, layout
+from solver.reference import ReferenceSolver
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.solve import check_width, kernel_robot, kernel_scene
@@ -109,3 +111,27 @@ class BatchSolver:
 
     def _move(self, robots: list[int]) -> None:
         self._fleet.step(robots, self._commands, self.blocks, self.statuses, self.iterations)
+
+
+class ReferenceBatch(BatchSolver):
+    """The same robots moved by :class:`solver.ReferenceSolver`, one after the other and slowly.
+
+    Trial pulls of :meth:`reaches` are the kernel's.
+    """
+
+    def _move(self, robots: list[int]) -> None:
+        for robot in robots:
+            scene = self._scenes[robot]
+            assert scene is not None
+            reference = _reference(self.robot, scene)
+            if self._commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
+                reached = reference.rest()
+            else:
+                reached = reference.step(self.equilibrium(robot), float(self._commands[robot, CABLE]))
+            self.blocks[robot] = reached.block
+            self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
+
+
+@lru_cache(maxsize=64)
+def _reference(robot: Robot, scene: Scene) -> ReferenceSolver:
+    return ReferenceSolver(robot, scene)

@@ -24,6 +24,7 @@ class Layout:
 
     def __init__(self, segments: int, lines: int, positions: int, obstacles: int) -> None:
         n, contacts = segments, (obstacles, lines, positions)
+        self.obstacles = obstacles
         self.size = 4
         self.coordinates = self._view(n)
         self.nodes = self._view(n + 1, 3)

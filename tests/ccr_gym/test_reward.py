@@ -1,12 +1,14 @@
+"""The reward's terms, for numbers of one step."""
+
 import numpy as np
 import pytest
 
-from ccr_gym.reward import RewardWeights, reward_terms
+from ccr_gym.reward import TERMS, RewardWeights, reward_terms
 
 
-def terms(force, desired=0.1, clearance=0.0, touching=True, action=0.0):
-    values = (np.float64(force), np.float64(desired), np.float64(clearance), np.bool_(touching), np.float64(action))
-    return reward_terms(RewardWeights(), *values)
+def terms(force, desired=0.1, clearance=0.0, action=0.0):
+    values = (np.array([value], float) for value in (force, desired, clearance, action))
+    return dict(zip(TERMS, reward_terms(RewardWeights(), *values)[:, 0], strict=True))
 
 
 def test_the_set_point_is_the_best_place():
@@ -18,14 +20,21 @@ def test_the_set_point_is_the_best_place():
 def test_each_term_reads_what_it_names():
     assert terms(0.12)["overshoot"] == pytest.approx(-0.1)
     assert terms(0.08)["overshoot"] == 0
-    assert terms(0.0, clearance=50.0, touching=False)["approach"] == pytest.approx(-0.5)
-    assert terms(0.0, clearance=50.0)["approach"] == 0
+    assert terms(0.0, clearance=50.0)["approach"] == pytest.approx(-0.5)
+    assert terms(0.0, clearance=500.0)["approach"] == -1
+    assert terms(0.1, clearance=50.0)["approach"] == 0
     assert terms(0.1, action=-1.0)["effort"] == pytest.approx(-0.02)
     assert terms(10.0)["force_error"] == -1
 
 
-def test_arrays_give_the_scalars_of_each_entry():
+def test_weights_scale_their_terms():
+    values = [np.array([value]) for value in (0.05, 0.1, 0.0, 0.5)]
+    doubled = reward_terms(RewardWeights(force_error=2, accuracy=2, overshoot=1, approach=2, effort=0.04), *values)
+    assert doubled == pytest.approx(2 * reward_terms(RewardWeights(), *values))
+
+
+def test_arrays_give_the_numbers_of_each_entry():
     forces = np.array([0.0, 0.08, 0.1, 0.2])
-    batch = reward_terms(RewardWeights(), forces, np.full(4, 0.1), np.zeros(4), np.ones(4, bool), np.zeros(4))
+    batch = reward_terms(RewardWeights(), forces, np.full(4, 0.1), np.full(4, 3.0), np.zeros(4))
     for i, force in enumerate(forces):
-        assert {name: value[i] for name, value in batch.items()} == terms(force)
+        assert dict(zip(TERMS, batch[:, i], strict=True)) == terms(force, clearance=3.0)

@@ -1,0 +1,83 @@
+"""A batch moves every robot as the solver would, whatever the company and the threads."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Circle, Robot, Scene, Solver, Status
+from solver.batch import BatchSolver
+from solver.robot import CABLES
+
+EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+
+
+def circles(generator, count):
+    drawn = generator.uniform((38, 75, 10), (75, 150, 16), (count, 3)).tolist()
+    return [Circle(center=(x, y), radius=r, stiffness=0.5 if k % 3 == 0 else None) for k, (x, y, r) in enumerate(drawn)]
+
+
+@EVERY_CABLE
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_every_robot_moves_as_alone(cable, threads):
+    robot, generator = replace(Robot.prototype(), cable=cable), np.random.default_rng(4)
+    scenes = [Scene([circle]) for circle in circles(generator, 37)]
+    batch = BatchSolver(robot, len(scenes), 1, threads)
+    for i, scene in enumerate(scenes):
+        batch.assign(i, scene)
+    batch.rest(range(len(scenes)))
+    solvers = [Solver(robot, scene) for scene in scenes]
+    alone = [solver.rest() for solver in solvers]
+    for _ in range(30):
+        commands = np.clip(batch.blocks[:, 0] + generator.uniform(-0.4, 0.7, len(scenes)), 0, 14)
+        batch.step(commands)
+        alone = [solver.step(now, command) for solver, now, command in zip(solvers, alone, commands, strict=True)]
+        for i, now in enumerate(alone):
+            assert np.array_equal(batch.blocks[i], now.block)
+            assert batch.statuses[i] == now.status
+    assert sum(now.contact.any() for now in alone) > 10
+
+
+def test_some_move_and_the_others_stay():
+    batch = BatchSolver(Robot.prototype(), 4, 0)
+    for i in range(4):
+        batch.assign(i, Scene())
+    batch.rest(range(4))
+    batch.step(np.array([2.0, 3.0]), [1, 3])
+    assert batch.blocks[:, 0].tolist() == [0, 2, 0, 3]
+    assert batch.equilibrium(3).status is Status.CONVERGED
+
+
+def test_reaches_is_a_steady_pull():
+    generator = np.random.default_rng(0)
+    scenes = [Scene([circle]) for circle in circles(generator, 60)]
+    batch, forces = BatchSolver(Robot.prototype(), 60, 1), generator.uniform(0.02, 0.3, 60)
+    for i, scene in enumerate(scenes):
+        batch.assign(i, scene)
+    found = batch.reaches(range(60), forces, 0.5, 14.0)
+    for scene, force, reached in zip(scenes, forces, found, strict=True):
+        solver = Solver(Robot.prototype(), scene)
+        now, expected = solver.rest(), False
+        for command in np.arange(0.5, 14, 0.5):
+            now = solver.step(now, command)
+            if now.status is not Status.CONVERGED:
+                break
+            if now.contact.any() and np.linalg.norm(now.forces.sum(axis=0)) >= force:
+                expected = True
+                break
+        assert reached == expected
+    assert 0 < found.sum() < 60
+
+
+def test_what_it_refuses():
+    for arguments, message in (((0, 1), "count is 0"), ((2, 1, 0), "threads is 0")):
+        with pytest.raises(ValueError, match=message):
+            BatchSolver(Robot.prototype(), *arguments)
+    batch = BatchSolver(Robot.prototype(), 2, 1)
+    with pytest.raises(ValueError, match="as many obstacles as it was made for"):
+        batch.assign(0, Scene())
+    batch.assign(0, Scene([Circle(center=(44, 104), radius=15)]))
+    with pytest.raises(ValueError, match="cable_mm is"):
+        batch.step(np.array([1.0, 99.0]))
+    with pytest.raises(ValueError, match="robot 1 has not been assigned"):
+        batch.equilibrium(1)
