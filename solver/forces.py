@@ -38,11 +38,10 @@ def virtual_work(
         offset_mm: Distance a of the cable from the backbone [mm].
         friction: Ratio μ of tangential to normal force.
     """
-    turned = np.stack([-forces[..., 1], forces[..., 0]], axis=-1)
-    directions = forces + friction * turned
-    work = (directions * slopes[..., None, :2]).sum(axis=(-2, -1))
+    x, y = forces[..., 0] - friction * forces[..., 1], forces[..., 1] + friction * forces[..., 0]
+    work = (x * slopes[..., None, 0] + y * slopes[..., None, 1]).sum(axis=-1)
     scale = offset_mm * load * slopes[..., 2] / np.where(work < 0, work, -np.inf)
-    return np.asarray(scale[..., None, None] * directions)
+    return np.stack([scale[..., None] * x, scale[..., None] * y], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)

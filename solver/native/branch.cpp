@@ -87,8 +87,8 @@ void Branch<Model>::load(const double* block) {
 }
 
 template <class Model>
-void Branch<Model>::store(double* block) const {
-  const Chain<Model>& chain = newton_.chain;
+void Branch<Model>::store(double* block) {
+  Chain<Model>& chain = newton_.chain;
   const std::size_t n = present_.controls.size();
   *block++ = present_.command.cable;
   *block++ = present_.command.length;
@@ -457,13 +457,15 @@ Status Branch<Model>::follow(const double* from, const Command& target, double* 
 
 template <class Model>
 bool Branch<Model>::reaches(double force, double increment, double limit, double length) {
-  std::vector<double> block(block_size());
-  block[1] = length;
-  follow(block.data(), {0, length}, block.data());
+  std::vector<double> rest(block_size());
+  rest[1] = length;
+  follow(rest.data(), {0, length}, rest.data());
   if (newton_.chain.violation() > 0) return false;
+  load(rest.data());
   const int obstacles = static_cast<int>(newton_.chain.obstacles().size());
   for (int i = 1; i * increment < limit; ++i) {
-    if (follow(block.data(), {i * increment, length}, block.data()) != Status::kConverged) return false;
+    if (follow({i * increment, length}) != Status::kConverged) return false;
+    settle();
     Position total{};
     for (int j = 0; j < obstacles; ++j) total += newton_.chain.push(present_.active, j);
     if (newton_.chain.touching(present_.active) && norm(total) >= force) return true;

@@ -67,7 +67,7 @@ class Branch : public Follower {
   enum class End { kPassed, kSnapped, kBlocked, kOverTension };
 
   void load(const double* block);
-  void store(double* block) const;
+  void store(double* block);
   double first_tension(const Command& start);
   Status follow(const Command& target);
   double goal_cable(double target) const;

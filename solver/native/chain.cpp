@@ -44,6 +44,7 @@ template <class Model>
 Chain<Model>::Chain(const Robot& robot, int obstacles)
     : robot_(robot),
       bends_(robot.segments),
+      one_(1),
       origin_(robot.segments + 1),
       clear_(obstacles),
       states_(robot.segments + 1),
@@ -144,28 +145,30 @@ void Chain<Model>::load_springs(const std::vector<Position>& mounts) {
 }
 
 template <class Model>
-void Chain<Model>::relax(Iterate& at) const {
-  const Command& command = at.command;
+Control Chain<Model>::relaxed(const Command& command) {
+  const double pull = command.cable / robot_.segments, length = command.length / robot_.segments;
+  Control control{};
+  if constexpr (Model::kSliding) control[0] = pull / robot_.offset;
+  for (int i = 0; i <= (Model::kSliding ? limits::kRelaxIterations : 0); ++i) {
+    Model::bend(1, control.v.data(), pull, length, robot_.offset, one_);
+    if constexpr (Model::kSliding) control[0] -= (one_[0].taken - pull) / one_[0].taken_slope;
+  }
+  return control;
+}
+
+template <class Model>
+void Chain<Model>::relax(Iterate& at) {
   at.active.count = 0;
   std::fill(at.mounts.begin(), at.mounts.end(), Position{});
-  Control each{};
-  if constexpr (Model::kSliding) {
-    if (command.cable > 0) {
-      const double pull = command.cable / robot_.segments, length = command.length / robot_.segments;
-      typename Model::Bends bends(1);
-      each[0] = pull / robot_.offset;
-      double slope = 1;
-      for (int i = 0; i < limits::kRelaxIterations; ++i) {
-        Model::bend(1, each.v.data(), pull, length, robot_.offset, bends);
-        slope = bends[0].taken_slope;
-        each[0] -= (bends[0].taken - pull) / slope;
-      }
+  Control control{};
+  if constexpr (Model::kSliding)
+    if (at.command.cable > 0) {
+      control = relaxed(at.command);
       at.active.contact[0] = contacts();
-      at.active.multiplier[0] = 2 * each[0] / slope;
+      at.active.multiplier[0] = 2 * control[0] / one_[0].taken_slope;
       at.active.count = 1;
     }
-  }
-  std::fill(at.controls.begin(), at.controls.end(), each);
+  std::fill(at.controls.begin(), at.controls.end(), control);
 }
 
 // Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
@@ -385,16 +388,11 @@ Position Chain<Model>::push(const ActiveSet& active, int obstacle) const {
 
 // All segments have the same shape: the sums over their directions (i + 1/2) θ are taken by turning one of them on.
 template <class Model>
-Vec<3> Chain<Model>::free_slopes(const Command& command) const {
+Vec<3> Chain<Model>::free_slopes(const Command& command) {
   const int n = robot_.segments;
   const double length = command.length / n;
-  Iterate one;
-  one.controls.resize(1);
-  one.command = command;
-  relax(one);
-  typename Model::Bends bends(1);
-  Model::bend(1, one.controls[0].v.data(), command.cable / n, length, robot_.offset, bends);
-  const auto bend = bends[0];
+  relaxed(command);
+  const auto bend = one_[0];
   double turn, stretch = 0;  // slopes of the angle and of the logarithm of the chord
   if constexpr (Model::kSliding) {
     turn = 1 / (n * bend.taken_slope);

@@ -124,7 +124,7 @@ class Chain {
   bool evaluate(const Iterate& at);
 
   // The shape that no obstacle touches, which is known, and what holds it.
-  void relax(Iterate& at) const;
+  void relax(Iterate& at);
 
   // Slope of the Lagrangian J - Σ λ c with respect to the controls, with the adjoints it is made of.
   void reduced_gradient(const ActiveSet& active);
@@ -134,7 +134,7 @@ class Chain {
   Position push(const ActiveSet& active, int obstacle) const;  // its force on the robot [N]
 
   // Slopes of the tip's pose in the cable displacement of a robot that nothing touches (eq. 7).
-  Vec<3> free_slopes(const Command& command) const;
+  Vec<3> free_slopes(const Command& command);
 
   const Robot& robot() const { return robot_; }
   std::span<const Obstacle> obstacles() const { return obstacles_; }
@@ -176,6 +176,7 @@ class Chain {
   const Obstacle& obstacle(int contact) const { return obstacles_[contact / points_.size()]; }
   Position point(int contact) const;  // in the frame of the mount
   const Site& site(int contact) const { return sites_[contact % points_.size()]; }
+  Control relaxed(const Command& command);  // the coordinate of every segment then, whose law stands in `one_`
   void load_springs(const std::vector<Position>& mounts);
   void measure_gaps(double slack);
 
@@ -185,6 +186,7 @@ class Chain {
   double pull_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
   double objective_ = 0, energy_ = 0, steepest_ = 0;
   typename Model::Bends bends_;
+  typename Model::Bends one_;
   std::vector<Position> origin_;  // nodes of the shape looked around from
   std::vector<Position> mount_origin_;  // mounts of that shape
   std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach

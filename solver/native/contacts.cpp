@@ -11,26 +11,27 @@ using namespace limits;
 
 template <class Model>
 Contacts<Model>::Contacts(int segments, int mounts)
-    : slopes_(kMaxActive), responses_(kMaxActive, Direction(segments, mounts)), loads_(kMaxActive + 1) {}
+    : slopes_(kMaxActive), penalties_(kMaxActive), responses_(kMaxActive, Direction(segments, mounts)), loads_(kMaxActive + 1) {}
 
 template <class Model>
-Contacts<Model>::Load Contacts<Model>::load(const Chain& chain, int contact, int j) {
+Contacts<Model>::Load Contacts<Model>::load(const Chain& chain, int contact, int j, double penalty) {
   slopes_[j] = chain.slope(contact);
+  penalties_[j] = penalty;
   return {&slopes_[j], &responses_[j]};
 }
 
 // What the penalty on the active gaps adds to a step while they are not closed.
 template <class Model>
-void Contacts<Model>::penalize(const Chain& chain, const Hessian& hessian, const ActiveSet& active,
-                               Direction& step) const {
+void Contacts<Model>::penalize(const Chain& chain, const ActiveSet& active, Direction& step) const {
   for (int j = 0; j < active.count; ++j)
-    if (hessian.penalty(j) != 0) step.add(-hessian.penalty(j) * chain.gaps()[active.contact[j]], responses_[j]);
+    if (penalties_[j] != 0) step.add(-penalties_[j] * chain.gaps()[active.contact[j]], responses_[j]);
 }
 
 // Takes a contact out, with its slope and response; `responses` counts those in use.
 template <class Model>
 void Contacts<Model>::release(ActiveSet& active, int j, int responses) {
   std::rotate(slopes_.begin() + j, slopes_.begin() + j + 1, slopes_.begin() + responses);
+  std::rotate(penalties_.begin() + j, penalties_.begin() + j + 1, penalties_.begin() + responses);
   std::rotate(responses_.begin() + j, responses_.begin() + j + 1, responses_.begin() + responses);
   active.drop(j);
 }
@@ -107,7 +108,7 @@ template <class Model>
 bool Contacts<Model>::admit(const Chain& chain, Hessian& hessian, int contact, ActiveSet& active, Direction& step) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   if (active.count == kMaxActive) return false;
-  const Load newcomer = load(chain, contact, active.count);
+  const Load newcomer = load(chain, contact, active.count, 0);
   hessian.respond(chain, {&newcomer, 1});
   double multiplier = 0;
   for (;;) {
@@ -186,16 +187,17 @@ bool Contacts<Model>::meet(const Chain& chain, Hessian& hessian, ActiveSet& acti
 template <class Model>
 bool Contacts<Model>::solve(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
   int count = 0;
-  for (; count < active.count; ++count) loads_[count] = load(chain, active.contact[count], count);
+  for (; count < active.count; ++count)
+    loads_[count] = load(chain, active.contact[count], count, hessian.penalty(count));
   loads_[count++] = {nullptr, &step};
   hessian.respond(chain, std::span(loads_).first(count));
-  penalize(chain, hessian, active, step);
+  penalize(chain, active, step);
   return meet(chain, hessian, active, step);
 }
 
 template <class Model>
 bool Contacts<Model>::restore(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
-  for (int j = 0; j < active.count; ++j) loads_[j] = load(chain, active.contact[j], j);
+  for (int j = 0; j < active.count; ++j) loads_[j] = load(chain, active.contact[j], j, 0);
   std::fill_n(active.multiplier.begin(), active.count, kHeld);
   step.clear();
   hessian.respond(chain, std::span(loads_).first(active.count));
@@ -206,7 +208,7 @@ template <class Model>
 bool Contacts<Model>::correct(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
   const Load load{nullptr, &step};
   hessian.respond(chain, {&load, 1});
-  penalize(chain, hessian, active, step);
+  penalize(chain, active, step);
   if (!factor(active)) return false;
   push(closing(chain, active, step), active, step);
   const auto end = active.multiplier.begin() + active.count;

@@ -35,8 +35,8 @@ class Contacts {
   using Load = typename Hessian::Load;
 
   double along(int j, const Direction& d) const { return slopes_[j].along(d); }
-  Load load(const Chain& chain, int contact, int j);
-  void penalize(const Chain& chain, const Hessian& hessian, const ActiveSet& active, Direction& step) const;
+  Load load(const Chain& chain, int contact, int j, double penalty);
+  void penalize(const Chain& chain, const ActiveSet& active, Direction& step) const;
   void release(ActiveSet& active, int j, int responses);
   bool factor(const ActiveSet& active);
   void apply_inverse(int count, Column& x) const;
@@ -49,6 +49,7 @@ class Contacts {
 
   // Of the active gaps in their order, then of one that is being admitted.
   std::vector<typename Chain::Slope> slopes_;
+  std::vector<double> penalties_;     // in the curvature
   std::vector<Direction> responses_;  // H⁻¹∇c
   std::vector<Load> loads_;
   std::array<Column, limits::kMaxActive> gram_;
