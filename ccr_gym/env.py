@@ -7,9 +7,10 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from ccr_gym.fleet import Fleet
+from ccr_gym.fleet import Fleet, Reading
 from ccr_gym.observation import FORCE_SCALE_N
 from ccr_gym.rendering import Frame, Renderer
+from ccr_gym.reward import TERMS
 from ccr_gym.settings import Settings, require
 from ccr_gym.tasks import Assignment, Task
 from solver import Equilibrium
@@ -39,7 +40,6 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         )
         self.task, self.settings, self.render_mode = task, Settings(**settings), render_mode
         self._fleet = Fleet(task, self.settings, 1)
-        self._effort = np.zeros(1)
         self._renderer: Renderer | None = None
         self._started = False
         self.observation_space, self.action_space = single_spaces(self._fleet, self.settings)
@@ -64,7 +64,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self._started = True
         if self.render_mode == "human":
             self.render()
-        return self._observe(), _row(self._fleet.infos(np.zeros_like(self._fleet.rewards())))
+        reading = self._fleet.read(0)
+        return self._observation(reading), self._fleet.infos(reading, (0.0,) * len(TERMS), 0)
 
     def step(self, action: np.ndarray) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Move the cable by ``action · max_increment_mm``, as far as tension and obstacles allow.
@@ -78,12 +79,13 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         pull = np.asarray(action)
         if pull.shape != (1,) or not math.isfinite(pull[0]):
             raise ValueError(f"action is {action!r}; it must be one finite number in an array of shape (1,)")
-        self._effort[0] = min(max(float(pull[0]), -1.0), 1.0)
-        self._fleet.step(self._effort)
-        terms = self._fleet.rewards()
+        fleet = self._fleet
+        fleet.step(min(max(float(pull[0]), -1.0), 1.0), 0)
+        reading = fleet.read(0)
+        terms = tuple(map(float, fleet.rewards(reading, 0)))
         if self.render_mode == "human":
             self.render()
-        return self._observe(), float(terms.sum()), False, False, _row(self._fleet.infos(terms))
+        return self._observation(reading), sum(terms), False, False, fleet.infos(reading, terms, 0)
 
     def render(self) -> np.ndarray | None:
         """The robot, obstacles, contacts, forces and set-point: ``(H, W, 3)`` uint8, or a window in human mode."""
@@ -91,9 +93,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human', and a reset")
             return None
         self._renderer = self._renderer or Renderer(self.metadata["render_fps"])
-        force_true, force_est, _ = self._fleet.reading
-        desired = float(self._fleet.desired[0])
-        frame = Frame(self.equilibrium, force_true[0], force_est[0], desired, FORCE_SCALE_N)
+        reading = self._fleet.read(0)
+        frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, FORCE_SCALE_N)
         if self.render_mode == "rgb_array":
             return self._renderer.draw(frame)
         self._renderer.show(frame)
@@ -110,8 +111,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         """The present equilibrium; immutable."""
         return self._fleet.equilibrium(0)
 
-    def _observe(self) -> Observation:
-        row = self._fleet.observe()[0]
+    def _observation(self, reading: Reading) -> Observation:
+        row = self._fleet.observe(reading)
         return row if self.settings.obs_mode == "flat" else self._fleet.observer.entries(row)
 
 
@@ -129,11 +130,3 @@ def _assignment(options: dict[str, Any]) -> Assignment:
     force = options["desired_force"]
     require(0 < force <= FORCE_SCALE_N, f"desired_force is {force}; it must be positive and at most {FORCE_SCALE_N}")
     return Assignment(options["scene"], float(force))
-
-
-def _row(infos: dict[str, Any]) -> dict[str, Any]:
-    """The first row of arrays over environments, single numbers as plain ones."""
-    return {
-        key: _row(value) if isinstance(value, dict) else value[0] if value.ndim > 1 else value[0].item()
-        for key, value in infos.items()
-    }

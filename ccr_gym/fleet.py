@@ -1,4 +1,4 @@
-"""Episodes of one task side by side: the transition, what is seen of it and what it is worth, in whole arrays.
+"""Episodes of one task side by side: the transition, what is seen of it and what it is worth.
 
 Every environment, single or vector, is a shell around a fleet, so that they cannot drift apart.
 """
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ccr_gym.observation import Observer
-from ccr_gym.reward import TERMS, reward_terms
+from ccr_gym.reward import ARRAYS, NUMBERS, TERMS, Operations, reward_terms
 from ccr_gym.settings import Settings, require
 from ccr_gym.tasks import Assignment, Task, assign
 from solver import Equilibrium, Solver
@@ -17,19 +17,35 @@ from solver.batch import BatchSolver, ReferenceBatch
 from solver.forces import virtual_work
 from solver.layout import CABLE, TENSION
 
+ALL = slice(None)
+Which = int | slice | list[int]
+
 
 class Reading(NamedTuple):
-    """What the robots feel, one row each.
+    """What one robot feels, or what all of them do.
 
     Attributes:
-        force_true: Contact force on the robot, ``(N, 2)`` [N].
-        force_est: The same by virtual work, ``(N, 2)`` [N].
-        force: Magnitude of the true one, ``(N,)`` [N].
+        blocks: Their equilibria, ``(..., size)``.
+        force_true: Contact force on the robot, ``(..., 2)`` [N].
+        force_est: The same by virtual work, ``(..., 2)`` [N].
+        force: Magnitude of the true one [N].
+        desired: Set-point [N].
     """
 
+    blocks: np.ndarray
     force_true: np.ndarray
     force_est: np.ndarray
-    force: np.ndarray
+    force: Any
+    desired: Any
+
+
+def _operations(which: Which) -> Operations:
+    return NUMBERS if isinstance(which, int) else ARRAYS
+
+
+def _plain(value: Any, which: Which) -> Any:
+    """A number of one robot as Python's own, those of many as an array of their own."""
+    return value.item() if isinstance(which, int) else value.copy()
 
 
 class Fleet:
@@ -56,7 +72,6 @@ class Fleet:
         self.solver = solver(settings.robot, self.count, obstacles, self._threads)
         self._layout = self.solver.layout
         self.observer = Observer(settings.robot, self._layout, settings.force_sensor, settings.cable_limit_mm)
-        self._reading: Reading | None = None
 
     def draw(self, robots: Sequence[int], generators: Sequence[np.random.Generator]) -> None:
         """Start new episodes of some robots, each drawn by its own generator."""
@@ -81,62 +96,55 @@ class Fleet:
     def _begin(self, robots: Sequence[int]) -> None:
         self.solver.rest(robots)
         self._effort[robots] = 0.0
-        self._reading = None
 
-    def step(self, effort: np.ndarray, robots: Sequence[int] | None = None) -> None:
+    def step(self, effort: Any, which: Which = ALL) -> None:
         """Move the cables of all robots, or of some, by ``effort · max_increment_mm``.
 
         Args:
-            effort: Normalised cable increments in [−1, 1] of these robots, ``(k,)``.
-            robots: Which; ``None`` for all.
+            effort: Normalised cable increments in [−1, 1] of these robots, a number or ``(k,)``.
+            which: One robot, a list of them, or all.
         """
-        settings, blocks = self._settings, self.solver.blocks
-        present = blocks[:, CABLE] if robots is None else blocks[robots, CABLE]
-        command = present + effort * settings.max_increment_mm
-        self.solver.step(np.minimum(np.maximum(command, 0.0), settings.cable_limit_mm), robots)
-        self._effort[slice(None) if robots is None else robots] = effort
-        self._reading = None
+        settings, (minimum, maximum, _) = self._settings, _operations(which)
+        command = self.solver.blocks[which, CABLE] + effort * settings.max_increment_mm
+        self.solver.commands[which, CABLE] = minimum(maximum(command, 0.0), settings.cable_limit_mm)
+        self._effort[which] = effort
+        self.solver.move(which)
 
-    @property
-    def reading(self) -> Reading:
-        """What the robots feel now."""
-        if self._reading is None:
-            blocks, settings = self.solver.blocks, self._settings
-            force_true = self._layout.force(blocks).copy()
-            force = np.hypot(force_true[:, 0], force_true[:, 1])
+    def read(self, which: int | slice = ALL) -> Reading:
+        """What one robot or all of them feel now."""
+        layout, settings, blocks = self._layout, self._settings, self.solver.blocks[which]
+        force_true = layout.force(blocks).copy()
+        force = np.hypot(force_true[..., 0], force_true[..., 1])
+        if force.any():
+            load, offset = blocks[..., TENSION] - layout.onset(blocks)[..., 0], settings.robot.offset_mm
+            shares = virtual_work(layout.forces(blocks), load, layout.tip_slopes(blocks), offset, settings.friction)
+            force_est = shares.sum(axis=-2)
+        else:
             force_est = np.zeros_like(force_true)
-            touching = force > 0
-            if touching.any():
-                forces, slopes = self._layout.forces(blocks), self._layout.tip_slopes(blocks)
-                load = blocks[:, TENSION] - self._layout.onset(blocks)[:, 0]
-                offset = settings.robot.offset_mm
-                force_est = virtual_work(forces, load, slopes, offset, settings.friction).sum(axis=1)
-            self._reading = Reading(force_true, force_est, force)
-        return self._reading
+        return Reading(blocks, force_true, force_est, _plain(force, which), _plain(self.desired[which], which))
 
-    def observe(self) -> np.ndarray:
-        """What is seen, in the flat form, ``(N, k)`` float32."""
-        reading = self.reading
-        return self.observer.flat(self.solver.blocks, reading.force, reading.force_est, self.desired)
+    def observe(self, reading: Reading) -> np.ndarray:
+        """What is seen, in the flat form, ``(k,)`` or ``(N, k)`` float32."""
+        return self.observer.flat(reading.blocks, reading.force, reading.force_est, reading.desired)
 
-    def rewards(self) -> np.ndarray:
-        """Terms of the reward of the last step, ``(5, N)``."""
-        clearance = self._layout.clearance(self.solver.blocks)[:, 0]
-        return reward_terms(self._settings.weights, self.reading.force, self.desired, clearance, self._effort)
+    def rewards(self, reading: Reading, which: int | slice = ALL) -> tuple[Any, ...]:
+        """Terms of the reward of the last step."""
+        clearance, effort = self._layout.clearance(reading.blocks)[..., 0], self._effort[which]
+        told = _plain(clearance, which), _plain(effort, which)
+        return reward_terms(self._settings.weights, reading.force, reading.desired, *told, _operations(which))
 
-    def infos(self, terms: np.ndarray) -> dict[str, Any]:
-        """What is told beside the observation, an array over the robots for each name."""
-        force_true, force_est, force = self.reading
-        blocks = self.solver.blocks
+    def infos(self, reading: Reading, terms: tuple[Any, ...], which: int | slice = ALL) -> dict[str, Any]:
+        """What is told beside the observation, a plain number for one robot and an array for many."""
+        blocks, force_true, force_est, force, desired = reading
         return {
-            "force_true": force_true.copy(),
-            "force_est": force_est.copy(),
-            "desired_force": self.desired.copy(),
-            "cable_mm": blocks[:, CABLE].copy(),
-            "tension": blocks[:, TENSION].copy(),
-            "solver_status": self.solver.statuses.astype(int),
-            "cost": np.maximum(0.0, force - self._settings.force_limit),
-            "is_success": np.abs(force - self.desired) <= 0.05 * self.desired,
+            "force_true": force_true,
+            "force_est": force_est,
+            "desired_force": desired,
+            "cable_mm": _plain(blocks[..., CABLE], which),
+            "tension": _plain(blocks[..., TENSION], which),
+            "solver_status": _plain(self.solver.statuses[which].astype(int), which),
+            "cost": _operations(which).maximum(0.0, force - self._settings.force_limit),
+            "is_success": abs(force - desired) <= 0.05 * desired,
             "reward_terms": dict(zip(TERMS, terms, strict=True)),
         }
 

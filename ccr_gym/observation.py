@@ -1,4 +1,6 @@
-"""The observation: what is seen, how it is scaled, and its flat form. All of it in whole arrays over environments."""
+"""The observation: what is seen, how it is scaled, and its flat form. All of it for one environment or many."""
+
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -58,21 +60,21 @@ class Observer:
                 self._source[self._places[key]], self._scale[self._places[key]] = source, scale
         self._force_sensor = force_sensor
 
-    def flat(self, blocks: np.ndarray, force: np.ndarray, force_est: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """The flat form, ``(N, k)`` float32.
+    def flat(self, blocks: np.ndarray, force: Any, force_est: np.ndarray, desired: Any) -> np.ndarray:
+        """The flat form of one robot, ``(k,)`` float32, or of many, ``(N, k)``.
 
         Args:
-            blocks: Equilibria, ``(N, size)``.
-            force: Magnitude of the measured force, ``(N,)`` [N].
-            force_est: Estimated force on the robot, ``(N, 2)`` [N].
-            desired: Set-points, ``(N,)`` [N].
+            blocks: Equilibrium, ``(size,)`` or ``(N, size)``.
+            force: Magnitude of the measured force [N].
+            force_est: Estimated force on the robot, ``(..., 2)`` [N].
+            desired: Set-point [N].
         """
-        rows, at = blocks[:, self._source], self._places
+        rows, at = blocks[..., self._source], self._places
         rows *= self._scale
-        rows[:, at["desired_force"].start] = desired / FORCE_SCALE_N
-        rows[:, at["force_est"]] = force_est / FORCE_SCALE_N
+        rows[..., at["desired_force"].start] = desired / FORCE_SCALE_N
+        rows[..., at["force_est"]] = force_est / FORCE_SCALE_N
         if self._force_sensor:
-            rows[:, at["force_error"].start] = (desired - force) / FORCE_SCALE_N
+            rows[..., at["force_error"].start] = (desired - force) / FORCE_SCALE_N
         np.maximum(rows, self._low, out=rows)
         np.minimum(rows, self._high, out=rows)
         return np.asarray(rows, np.float32)

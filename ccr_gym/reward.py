@@ -1,7 +1,8 @@
-"""The reward: named terms, and their sum, in whole arrays over environments."""
+"""The reward: named terms, and their sum."""
 
-from dataclasses import astuple, dataclass, fields
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,33 +29,38 @@ class RewardWeights:
 TERMS = tuple(field.name for field in fields(RewardWeights))
 
 
+class Operations(NamedTuple):
+    """What is written once for a number and for an array of them; the bits are the same."""
+
+    minimum: Callable[[Any, Any], Any]
+    maximum: Callable[[Any, Any], Any]
+    where: Callable[[Any, Any, Any], Any]
+
+
+ARRAYS = Operations(np.minimum, np.maximum, np.where)
+NUMBERS = Operations(min, max, lambda condition, yes, no: yes if condition else no)
+
+
 def reward_terms(
-    weights: RewardWeights, force: np.ndarray, desired: np.ndarray, clearance: np.ndarray, action: np.ndarray
-) -> np.ndarray:
-    """Weighted terms in the order of :data:`TERMS`, whose sum is the reward, ``(5, N)``.
+    weights: RewardWeights, force: Any, desired: Any, clearance: Any, action: Any, operations: Operations
+) -> tuple[Any, ...]:
+    """Weighted terms in the order of :data:`TERMS`, whose sum is the reward: five numbers, or arrays ``(N,)``.
 
     Args:
         weights: Their weights.
-        force: Magnitude of the contact force, zero where nothing touches, ``(N,)`` [N].
-        desired: Desired force, ``(N,)`` [N].
-        clearance: Smallest gap, ``(N,)`` [mm].
-        action: Normalised cable increment in [−1, 1], ``(N,)``.
+        force: Magnitude of the contact force, zero where nothing touches [N].
+        desired: Desired force [N].
+        clearance: Smallest gap [mm].
+        action: Normalised cable increment in [−1, 1].
+        operations: Those of numbers or those of arrays, as the others are.
     """
+    minimum, maximum, where = operations
     excess = force / desired - 1.0
-    error = np.abs(excess)
-    terms = np.empty((len(TERMS), len(force)))
-    np.minimum(error, 1.0, out=terms[0])
-    np.exp(-20.0 * error, out=terms[1])
-    np.minimum(np.maximum(excess, 0.0), 1.0, out=terms[2])
-    np.minimum(np.maximum(clearance, 0.0) / 100.0, 1.0, out=terms[3])
-    terms[3][force > 0] = 0.0
-    np.multiply(action, action, out=terms[4])
-    terms *= _signed(weights)
-    return terms
-
-
-@lru_cache(maxsize=16)
-def _signed(weights: RewardWeights) -> np.ndarray:
-    """The weights with the signs of their terms, ``(5, 1)``."""
-    signs = {"accuracy": 1.0}
-    return np.array([[signs.get(name, -1.0) * weight] for name, weight in zip(TERMS, astuple(weights), strict=True)])
+    error = abs(excess)
+    return (
+        -weights.force_error * minimum(error, 1.0),
+        weights.accuracy * np.exp(-20.0 * error),
+        -weights.overshoot * minimum(maximum(excess, 0.0), 1.0),
+        -weights.approach * where(force > 0, 0.0, minimum(maximum(clearance, 0.0) / 100.0, 1.0)),
+        -weights.effort * (action * action),
+    )

@@ -10,6 +10,7 @@ from gymnasium.vector.utils import batch_space
 
 from ccr_gym.env import METADATA, Observation, single_spaces
 from ccr_gym.fleet import Fleet
+from ccr_gym.reward import TERMS
 from ccr_gym.settings import Settings, require
 from ccr_gym.tasks import Task
 
@@ -85,8 +86,9 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
                 self._generators[i], _ = seeding.np_random(seeds[i])
         self._begin(np.flatnonzero(mask))
         self._started = True
-        terms = np.zeros_like(self._fleet.rewards())
-        return self._observation(self._fleet.observe()), _masked(self._fleet.infos(terms), mask)
+        reading = self._fleet.read()
+        terms = tuple(np.zeros((len(TERMS), self.num_envs)))
+        return self._observation(self._fleet.observe(reading)), _masked(self._fleet.infos(reading, terms), mask)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Infos]:
         """Move the cables, and reset as the autoreset mode says.
@@ -110,30 +112,34 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         else:
             self._fleet.step(effort)
         self._steps += ~resetting
-        terms = self._fleet.rewards()
-        terms[:, resetting] = 0.0
+        reading = self._fleet.read()
+        terms = self._fleet.rewards(reading)
+        for term in terms:
+            term[resetting] = 0.0
         truncated = self._steps >= self.max_episode_steps
-        rows, infos = self._fleet.observe(), self._fleet.infos(terms)
+        rows, infos = self._fleet.observe(reading), self._fleet.infos(reading, terms)
         self._ended = truncated.copy()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and truncated.any():
-            rows, infos = self._restart(truncated, rows, infos)
+            rows, infos = self._restart(truncated, rows, infos, terms)
         else:
             infos = _masked(infos, everything)
-        rewards = terms.sum(axis=0)
+        rewards = sum(terms)
         return self._observation(rows), rewards, np.zeros(self.num_envs, bool), truncated, infos
 
-    def _restart(self, ended: np.ndarray, rows: np.ndarray, infos: Infos) -> tuple[np.ndarray, Infos]:
+    def _restart(
+        self, ended: np.ndarray, rows: np.ndarray, infos: Infos, terms: tuple[np.ndarray, ...]
+    ) -> tuple[np.ndarray, Infos]:
         """Begin new episodes in the place of some that have ended, which are told of in ``final_obs, final_info``."""
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
             final[i] = self._observation(rows[i])
         told: Infos = {"final_obs": final, "_final_obs": ended.copy(), "final_info": _masked(infos, ended)}
         told["_final_info"] = ended.copy()
-        terms = np.stack([infos["reward_terms"][name] for name in infos["reward_terms"]])
         self._begin(np.flatnonzero(ended))
-        terms[:, ended] = 0.0
         self._ended = np.zeros(self.num_envs, bool)
-        return self._fleet.observe(), _masked(self._fleet.infos(terms), np.ones(self.num_envs, bool)) | told
+        reading, everything = self._fleet.read(), np.ones(self.num_envs, bool)
+        fresh = tuple(np.where(ended, 0.0, term) for term in terms)
+        return self._fleet.observe(reading), _masked(self._fleet.infos(reading, fresh), everything) | told
 
     def _begin(self, robots: np.ndarray) -> None:
         names = robots.tolist()
@@ -152,6 +158,8 @@ def _masked(infos: Infos, mask: np.ndarray) -> Infos:
         if isinstance(value, dict):
             told[key] = _masked(value, mask)
         else:
-            told[key] = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, np.zeros((), value.dtype))
+            told[key] = (
+                value if mask.all() else np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type())
+            )
         told[f"_{key}"] = mask.copy()
     return told

@@ -24,6 +24,7 @@ class BatchSolver:
         blocks: Equilibria, ``(N, size)``; :attr:`layout` tells where their numbers stand.
         statuses: How the last step of each ended, values of :class:`solver.Status`, ``(N,)``.
         iterations: Newton iterations of these steps, ``(N,)``.
+        commands: Cable displacement and length each is moved to, ``(N, 2)`` [mm].
 
     Args:
         robot: What all robots are.
@@ -45,7 +46,7 @@ class BatchSolver:
         self.statuses = np.zeros(count, np.intc)
         self.iterations = np.zeros(count, np.intc)
         self._scenes: list[Scene | None] = [None] * count
-        self._commands = np.zeros((count, 2))
+        self.commands = np.zeros((count, 2))
         self._fleet = _kernel.Fleet(robot.cable == "sliding", kernel_robot(robot), count, obstacles, threads)
         self._all = list(range(count))
 
@@ -63,7 +64,7 @@ class BatchSolver:
         """Make some robots straight and unactuated again."""
         self.blocks[robots] = 0.0
         self.blocks[robots, LENGTH] = self.robot.length_mm
-        self._commands[robots] = 0.0, self.robot.length_mm
+        self.commands[robots] = 0.0, self.robot.length_mm
         self._move(list(robots))
 
     def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
@@ -78,12 +79,13 @@ class BatchSolver:
         """
         if not ((cable_mm >= 0) & (cable_mm <= self.robot.cable_limit_mm)).all():
             raise ValueError(f"cable_mm is {cable_mm}; all must be from 0 to {self.robot.cable_limit_mm:.6g}")
-        if robots is None:
-            self._commands[:, CABLE] = cable_mm
-            self._move(self._all)
-        else:
-            self._commands[robots, CABLE] = cable_mm
-            self._move(list(robots))
+        which = self._all if robots is None else list(robots)
+        self.commands[which, CABLE] = cable_mm
+        self.move(which)
+
+    def move(self, which: int | slice | list[int]) -> None:
+        """Move one robot, some or all to their commands, which must be in range."""
+        self._move([which] if isinstance(which, int) else which if isinstance(which, list) else self._all[which])
 
     def reaches(self, robots: Sequence[int], forces: np.ndarray, increment_mm: float, limit_mm: float) -> np.ndarray:
         """Whether pulling some robots steadily from rest gets each to a contact force, ``(k,)`` bool.
@@ -110,7 +112,7 @@ class BatchSolver:
         return Equilibrium(self.robot, scene, self.blocks[index].copy(), status, iterations)
 
     def _move(self, robots: list[int]) -> None:
-        self._fleet.step(robots, self._commands, self.blocks, self.statuses, self.iterations)
+        self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations)
 
 
 class ReferenceBatch(BatchSolver):
@@ -124,10 +126,10 @@ class ReferenceBatch(BatchSolver):
             scene = self._scenes[robot]
             assert scene is not None
             reference = _reference(self.robot, scene)
-            if self._commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
+            if self.commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
                 reached = reference.rest()
             else:
-                reached = reference.step(self.equilibrium(robot), float(self._commands[robot, CABLE]))
+                reached = reference.step(self.equilibrium(robot), float(self.commands[robot, CABLE]))
             self.blocks[robot] = reached.block
             self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
 

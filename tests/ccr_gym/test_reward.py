@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from ccr_gym.reward import TERMS, RewardWeights, reward_terms
+from ccr_gym.reward import ARRAYS, NUMBERS, TERMS, RewardWeights, reward_terms
 
 
 def terms(force, desired=0.1, clearance=0.0, action=0.0):
-    values = (np.array([value], float) for value in (force, desired, clearance, action))
-    return dict(zip(TERMS, reward_terms(RewardWeights(), *values)[:, 0], strict=True))
+    return dict(zip(TERMS, reward_terms(RewardWeights(), force, desired, clearance, action, NUMBERS), strict=True))
 
 
 def test_the_set_point_is_the_best_place():
@@ -28,13 +27,14 @@ def test_each_term_reads_what_it_names():
 
 
 def test_weights_scale_their_terms():
-    values = [np.array([value]) for value in (0.05, 0.1, 0.0, 0.5)]
-    doubled = reward_terms(RewardWeights(force_error=2, accuracy=2, overshoot=1, approach=2, effort=0.04), *values)
-    assert doubled == pytest.approx(2 * reward_terms(RewardWeights(), *values))
+    doubled = RewardWeights(force_error=2, accuracy=2, overshoot=1, approach=2, effort=0.04)
+    for force in (0.0, 0.05, 0.15):
+        once, twice = (reward_terms(weights, force, 0.1, 3.0, 0.5, NUMBERS) for weights in (RewardWeights(), doubled))
+        assert twice == pytest.approx([2 * term for term in once])
 
 
 def test_arrays_give_the_numbers_of_each_entry():
     forces = np.array([0.0, 0.08, 0.1, 0.2])
-    batch = reward_terms(RewardWeights(), forces, np.full(4, 0.1), np.full(4, 3.0), np.zeros(4))
-    for i, force in enumerate(forces):
-        assert dict(zip(TERMS, batch[:, i], strict=True)) == terms(force, clearance=3.0)
+    batch = reward_terms(RewardWeights(), forces, np.full(4, 0.1), np.full(4, 3.0), np.zeros(4), ARRAYS)
+    for i, force in enumerate(forces.tolist()):
+        assert dict(zip(TERMS, (term[i] for term in batch), strict=True)) == terms(force, clearance=3.0)
