@@ -114,14 +114,14 @@ class Fleet:
         """What one robot or all of them feel now."""
         layout, settings, blocks = self._layout, self._settings, self.solver.blocks[which]
         force_true = layout.force(blocks).copy()
-        force = np.hypot(force_true[..., 0], force_true[..., 1])
-        if force.any():
+        force = _plain(np.hypot(force_true[..., 0], force_true[..., 1]), which)
+        if force > 0 if isinstance(which, int) else force.any():
             load, offset = blocks[..., TENSION] - layout.onset(blocks)[..., 0], settings.robot.offset_mm
             shares = virtual_work(layout.forces(blocks), load, layout.tip_slopes(blocks), offset, settings.friction)
             force_est = shares.sum(axis=-2)
         else:
-            force_est = np.zeros_like(force_true)
-        return Reading(blocks, force_true, force_est, _plain(force, which), _plain(self.desired[which], which))
+            force_est = np.zeros(force_true.shape)
+        return Reading(blocks, force_true, force_est, force, _plain(self.desired[which], which))
 
     def observe(self, reading: Reading) -> np.ndarray:
         """What is seen, in the flat form, ``(k,)`` or ``(N, k)`` float32."""
@@ -142,7 +142,7 @@ class Fleet:
             "desired_force": desired,
             "cable_mm": _plain(blocks[..., CABLE], which),
             "tension": _plain(blocks[..., TENSION], which),
-            "solver_status": _plain(self.solver.statuses[which].astype(int), which),
+            "solver_status": _plain(self.solver.statuses[which], which),
             "cost": _operations(which).maximum(0.0, force - self._settings.force_limit),
             "is_success": abs(force - desired) <= 0.05 * desired,
             "reward_terms": dict(zip(TERMS, terms, strict=True)),

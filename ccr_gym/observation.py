@@ -69,7 +69,7 @@ class Observer:
             force_est: Estimated force on the robot, ``(..., 2)`` [N].
             desired: Set-point [N].
         """
-        rows, at = blocks[..., self._source], self._places
+        rows, at = blocks[:, self._source] if blocks.ndim > 1 else blocks.take(self._source), self._places
         rows *= self._scale
         rows[..., at["desired_force"].start] = desired / FORCE_SCALE_N
         rows[..., at["force_est"]] = force_est / FORCE_SCALE_N
@@ -77,7 +77,7 @@ class Observer:
             rows[..., at["force_error"].start] = (desired - force) / FORCE_SCALE_N
         np.maximum(rows, self._low, out=rows)
         np.minimum(rows, self._high, out=rows)
-        return np.asarray(rows, np.float32)
+        return rows.astype(np.float32)
 
     def entries(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """The dictionary form of flat rows ``(..., k)``, as views."""

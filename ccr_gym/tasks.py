@@ -52,9 +52,9 @@ class LoadCell:
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
         node = round(14 / 18 * robot.segments)
-        distance = generator.uniform(*self.distance_mm)
+        distance, force = uniform(generator, self.distance_mm, self.force_n)
         wall = HalfPlane(point=(distance, self.height_mm), normal=(-1.0, 0.0), nodes=(node,))
-        return Assignment(Scene([wall]), generator.uniform(*self.force_n))
+        return Assignment(Scene([wall]), force)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +77,16 @@ class PushObstacle:
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
-        x, y = generator.uniform(*self.x_mm), generator.uniform(*self.y_mm)
-        circle = Circle(center=(x, y), radius=generator.uniform(*self.radius_mm))
-        return Assignment(Scene([circle]), generator.uniform(*self.force_n))
+        x, y, radius, force = uniform(generator, self.x_mm, self.y_mm, self.radius_mm, self.force_n)
+        return Assignment(Scene([Circle(center=(x, y), radius=radius)]), force)
+
+
+def uniform(generator: np.random.Generator, *ranges: tuple[float, float]) -> list[float]:
+    """A number from each of some ranges, all in one draw."""
+    return [
+        low + part * (high - low)
+        for part, (low, high) in zip(generator.random(len(ranges)).tolist(), ranges, strict=True)
+    ]
 
 
 def assign(

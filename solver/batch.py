@@ -43,8 +43,8 @@ class BatchSolver:
         self.robot, self.count = robot, count
         self.layout = layout(robot, obstacles)
         self.blocks = np.zeros((count, self.layout.size))
-        self.statuses = np.zeros(count, np.intc)
-        self.iterations = np.zeros(count, np.intc)
+        self.statuses = np.zeros(count, np.int64)
+        self.iterations = np.zeros(count, np.int64)
         self._scenes: list[Scene | None] = [None] * count
         self.commands = np.zeros((count, 2))
         self._fleet = _kernel.Fleet(robot.cable == "sliding", kernel_robot(robot), count, obstacles, threads)

@@ -25,8 +25,9 @@ def touchable_points(robot: Robot, scene: Scene) -> np.ndarray:
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
     """
-    touchable = np.empty((len(scene), len(robot.touch), robot.positions), bool)
+    touchable = np.ones((len(scene), len(robot.touch), robot.positions), bool)
     for points, obstacle in zip(touchable, scene, strict=True):
-        points[:] = obstacle.nodes is None
-        points[:, :: robot.between + 1] = obstacle.touchable(robot.segments + 1)
+        if obstacle.nodes is not None:
+            points[:] = False
+            points[:, :: robot.between + 1] = obstacle.touchable(robot.segments + 1)
     return touchable

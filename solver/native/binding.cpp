@@ -104,7 +104,7 @@ class Kernel {
 
 using Blocks = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Commands = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Counts = nb::ndarray<int, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Counts = nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // Robots alike in scenes of equally many obstacles; their blocks and commands are the caller's arrays.
@@ -130,7 +130,7 @@ class Fleet {
     expect(robots);
     double* block = blocks.data();
     const double* command = commands.data();
-    int *status = statuses.data(), *counted = iterations.data();
+    std::int64_t *status = statuses.data(), *counted = iterations.data();
     const std::size_t size = block_size();
     nb::gil_scoped_release released;
     batch_.each(robots, [&](ccr::Follower& follower, int k) {
