@@ -18,7 +18,7 @@ lint: $(INSTALL)
 	$(BIN)/mypy
 
 bench: $(INSTALL)
-	$(BIN)/python benchmarks/kernel.py
+	$(BIN)/ccr-gym bench
 
 soak: $(INSTALL)
 	$(BIN)/python -m pytest tests/solver/test_soak.py --soak 167000

@@ -9,7 +9,7 @@ try:
 except ModuleNotFoundError as error:
     raise SystemExit('the ccr-gym command needs its extra: pip install "ccr-gym[agents]"') from error
 
-from agents.config import EvaluateConfig, ReproduceConfig, TrainConfig
+from agents.config import BenchConfig, EvaluateConfig, ReproduceConfig, TrainConfig
 
 if TYPE_CHECKING:
     from agents.evaluate import Summary
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 Command = (
     Annotated[TrainConfig, tyro.conf.subcommand("train")]
     | Annotated[EvaluateConfig, tyro.conf.subcommand("evaluate")]
+    | Annotated[BenchConfig, tyro.conf.subcommand("bench")]
     | Annotated[ReproduceConfig, tyro.conf.subcommand("reproduce")]
 )
 
@@ -85,6 +86,13 @@ def show(summaries: "list[Summary]", title: str, written: list[Path]) -> None:
     console.print("Written: " + ", ".join(map(str, written)), soft_wrap=True)
 
 
+def bench(config: BenchConfig) -> None:
+    """Measure the kernel, the environments and a learner on them, beside peers in the same run."""
+    from agents.bench.report import bench as run
+
+    run(config)
+
+
 def reproduce(config: ReproduceConfig) -> None:
     """Regenerate the paper's planar figures and table, and check its claims in numbers."""
     from agents.reproduce import reproduce as run
@@ -96,11 +104,13 @@ def reproduce(config: ReproduceConfig) -> None:
 
 def main() -> None:
     """Entry point."""
-    command: TrainConfig | EvaluateConfig | ReproduceConfig = tyro.cli(Command, prog="ccr-gym")
+    command: TrainConfig | EvaluateConfig | BenchConfig | ReproduceConfig = tyro.cli(Command, prog="ccr-gym")
     if isinstance(command, TrainConfig):
         train(command)
     elif isinstance(command, EvaluateConfig):
         evaluate(command)
+    elif isinstance(command, BenchConfig):
+        bench(command)
     else:
         reproduce(command)
 

@@ -17,10 +17,12 @@ class TrainConfig:
     """Environment to train on."""
     seed: int = 0
     """Seed of the learner and of the first environment's scenes; below 1 000 000, where evaluation begins."""
-    steps: int = 300_000
+    steps: int = 160_000
     """Environment steps to train for."""
     envs: int = 32
     """Environments stepped side by side."""
+    threads: int = 1
+    """Threads of the solver; results do not depend on them."""
     rollout: int = 64
     """Steps of each environment between updates."""
     batch_size: int = 512
@@ -82,6 +84,18 @@ class EvaluateConfig:
             raise ValueError(f"episodes is {self.episodes}; it must be at least 1")
         if self.seed < EVALUATION_SEED:
             raise ValueError(f"seed is {self.seed}; it must be at least {EVALUATION_SEED}, beyond the training seeds")
+
+
+@dataclass(frozen=True, slots=True)
+class BenchConfig:
+    """Measure the kernel, the environments and a learner on them, beside peers in the same run."""
+
+    steps: int = 200_000
+    """Steps of the contact mix."""
+    rivals: int = 200
+    """Of these, how many IPOPT repeats."""
+    json: Path | None = Path("runs/bench.json")
+    """File the numbers are written to."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,37 +1,25 @@
 """PPO by Stable-Baselines3: train, save together what belongs together, and load it again."""
 
 from pathlib import Path
-from typing import Any
 
-import gymnasium
 import numpy as np
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.utils import LinearSchedule
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
-import ccr_gym  # noqa: F401 - registers the ids
 from agents.config import TrainConfig
 from agents.policy import Observation
+from agents.sb3_adapter import FleetVecEnv
 
 POLICY, CONFIG, NORMALIZER = "policy.zip", "config.json", "normalizer.pkl"
 
 
-def train(config: TrainConfig, progress: bool = True) -> Path:
-    """Train and save; returns the run folder."""
-    torch.set_num_threads(1)  # faster than more for networks this small
-    environments = make_vec_env(
-        config.env_id,
-        n_envs=config.envs,
-        seed=config.seed,
-        env_kwargs={"obs_mode": "flat", "disable_env_checker": True},
-    )
-    normalized = VecNormalize(environments, gamma=config.gamma, clip_obs=10.0)
-    config.run.mkdir(parents=True, exist_ok=True)
-    model = PPO(
+def learner(environments: VecEnv, config: TrainConfig) -> PPO:
+    """An untrained PPO with the settings of a run, on environments whose observations are scaled."""
+    return PPO(
         "MlpPolicy",
-        normalized,
+        VecNormalize(VecMonitor(environments), gamma=config.gamma, clip_obs=10.0),
         learning_rate=LinearSchedule(config.learning_rate, 0.0, 1.0),
         n_steps=config.rollout,
         batch_size=config.batch_size,
@@ -39,13 +27,22 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
         gamma=config.gamma,
         gae_lambda=config.gae_lambda,
         policy_kwargs={"net_arch": [config.width] * 2, "log_std_init": config.log_std_init},
-        tensorboard_log=str(config.run),
         seed=config.seed,
         device="cpu",
     )
+
+
+def train(config: TrainConfig, progress: bool = True) -> Path:
+    """Train and save; returns the run folder."""
+    torch.set_num_threads(1)  # faster than more for networks this small
+    config.run.mkdir(parents=True, exist_ok=True)
+    model = learner(FleetVecEnv(config.env_id, config.envs, config.seed, config.threads), config)
+    model.tensorboard_log = str(config.run)
     model.learn(config.steps, progress_bar=progress, tb_log_name="log")
-    save(model, normalized, config)
-    normalized.close()
+    normalizer = model.get_vec_normalize_env()
+    assert normalizer is not None
+    save(model, normalizer, config)
+    normalizer.close()
     return config.run
 
 
@@ -79,10 +76,7 @@ class PPOPolicy:
                 raise FileNotFoundError(f"{run / piece} is missing; train first: ccr-gym train --run {run}")
         self.config = TrainConfig.load(run / CONFIG)
         self._model = PPO.load(run / POLICY, device="cpu")
-        placeholder: Any = make_vec_env(
-            lambda: gymnasium.make(self.config.env_id, obs_mode="flat", disable_env_checker=True)
-        )
-        self._normalizer = VecNormalize.load(str(run / NORMALIZER), placeholder)
+        self._normalizer = VecNormalize.load(str(run / NORMALIZER), FleetVecEnv(self.config.env_id, 1))
 
     def reset(self) -> None:
         """Nothing to forget."""

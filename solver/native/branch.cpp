@@ -67,11 +67,14 @@ void Branch<Model>::load(const double* block) {
   place_points(newton_.chain.robot(), nodes_, levers_, points_);
   ActiveSet& active = present_.active;
   active.count = 0;
-  for (int c = 0; c < newton_.chain.contacts(); ++c)
-    if (block[c] > 0 && active.count < kMaxActive) {
-      active.contact[active.count] = c;
-      active.multiplier[active.count++] = block[c];
-    }
+  const double* flags = displacements + 4 * obstacles + 7;
+  const int points = static_cast<int>(points_.size());
+  if (std::find(flags, flags + points, 1.0) != flags + points)
+    for (int c = 0; c < newton_.chain.contacts(); ++c)
+      if (flags[c % points] != 0 && block[c] > 0 && active.count < kMaxActive) {
+        active.contact[active.count] = c;
+        active.multiplier[active.count++] = block[c];
+      }
   if (Model::kSliding && tension_ > 0 && active.count < kMaxActive) {
     active.contact[active.count] = newton_.chain.contacts();
     active.multiplier[active.count++] = tension_ / newton_.chain.robot().stiffness(present_.command.length);
@@ -103,8 +106,8 @@ void Branch<Model>::store(double* block) {
     if (present_.active.contact[j] < chain.contacts()) block[present_.active.contact[j]] = present_.active.multiplier[j];
   block += chain.contacts();
   chain.survey(block);
-  double clearance = std::numeric_limits<double>::infinity();
-  for (int c = 0; c < chain.contacts(); ++c) clearance = std::min(clearance, *block++);
+  const double clearance = lowest(chain.contacts(), [&](int c) { return block[c]; });
+  block += chain.contacts();
   const int obstacles = static_cast<int>(chain.obstacles().size());
   const auto write = [&](const Position& pair) { block = std::copy(pair.v.begin(), pair.v.end(), block); };
   const auto of_mount = [&](const std::vector<Position>& mounts, int j) {

@@ -1,8 +1,10 @@
 // Fixed-size dense blocks, small enough to be unrolled by the compiler.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace ccr {
 
@@ -61,6 +63,18 @@ Vec<N> minus(Vec<N> a, const Vec<N>& b) {
 template <int N>
 double norm(const Vec<N>& a) {
   return std::sqrt(dot(a, a));
+}
+
+// The smallest of n values, four at a time, as each comparison waits for the one before; infinity of none.
+template <class Value>
+double lowest(int n, Value value) {
+  double least[4];
+  for (double& one : least) one = std::numeric_limits<double>::infinity();
+  int i = 0;
+  for (; i + 4 <= n; i += 4)
+    for (int k = 0; k < 4; ++k) least[k] = std::min(least[k], value(i + k));
+  for (; i < n; ++i) least[0] = std::min(least[0], value(i));
+  return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
 }
 
 // Factors a symmetric matrix in place as L D Lᵀ: unit L below the diagonal, 1/D on it. False unless positive definite.

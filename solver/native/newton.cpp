@@ -32,7 +32,8 @@ template <class Model>
 bool Newton<Model>::equilibrium(const ActiveSet& active) const {
   double worst = 0;
   for (const Control& g : chain.gradient()) worst = std::max(worst, std::abs(g[0]));
-  for (const Position& g : chain.mount_gradient()) worst = std::max(worst, chain.robot().max_length * norm(g));
+  const double arm = chain.robot().max_length / chain.robot().segments;
+  for (const Position& g : chain.mount_gradient()) worst = std::max(worst, arm * norm(g));
   return worst <= chain.tolerance() && on_surface(active, kFeasibility);
 }
 

@@ -55,17 +55,16 @@ double clearance(const Obstacle& obstacle, const Position& point) {
 }
 
 double clearance(const Obstacle& obstacle, std::span<const Position> points) {
-  const Position normal = {{obstacle.parameters[0], obstacle.parameters[1]}};
-  double nearest = std::numeric_limits<double>::infinity();
+  const int count = static_cast<int>(points.size());
   if (obstacle.shape == Shape::kHalfPlane) {
-    for (const Position& point : points) nearest = std::min(nearest, dot(normal, point));
-    return nearest - obstacle.parameters[2];
+    const Position normal = {{obstacle.parameters[0], obstacle.parameters[1]}};
+    return lowest(count, [&](int k) { return dot(normal, points[k]); }) - obstacle.parameters[2];
   }
-  for (const Position& point : points) {
-    const double dx = point[0] - obstacle.center[0], dy = point[1] - obstacle.center[1];
-    nearest = std::min(nearest, dx * dx + dy * dy);
-  }
-  return std::sqrt(nearest) - obstacle.radius;
+  const double square = lowest(count, [&](int k) {
+    const Position offset = minus(points[k], obstacle.center);
+    return dot(offset, offset);
+  });
+  return std::sqrt(square) - obstacle.radius;
 }
 
 bool passes(const Obstacle& obstacle, const Position& from, const Position& to) {

@@ -1,22 +1,22 @@
 """Benchmark of the kernel: the contact mix, beside IPOPT on the same steps, and growth with the number of segments.
 
 Times are of single calls of the compiled step, taken from Python with a nanosecond clock; they include the overhead of
-the call, which is measured and printed beside them. Run: ``python benchmarks/kernel.py [--steps N] [--json PATH]``.
+the call, which is measured and printed beside them.
 """
 
-import argparse
-import json
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from timeit import timeit
+from typing import Any
 
 import numpy as np
 
 from solver import Circle, Equilibrium, Robot, Scene, Solver, Status
+from solver.batch import BatchSolver
 from solver.free import clearance
+from solver.layout import CABLE
 from solver.memo import TransitionMemo
 from solver.reference import ReferenceSolver
 
@@ -36,12 +36,12 @@ class Timed:
     microseconds: float
 
 
-def random_scene(generator: np.random.Generator, robot: Robot) -> Scene:
-    """One to three circles in 35–75 × 75–150 mm, r 10–16 mm, clear of the straight robot."""
+def random_scene(generator: np.random.Generator, robot: Robot, count: int | None = None) -> Scene:
+    """Some circles, one to three unless told, in 35–75 × 75–150 mm, r 10–16 mm, clear of the straight robot."""
     while True:
         circles = [
             Circle(center=(generator.uniform(35, 75), generator.uniform(75, 150)), radius=generator.uniform(10, 16))
-            for _ in range(generator.integers(1, 4))
+            for _ in range(count or generator.integers(1, 4))
         ]
         if clearance(robot, Scene(circles), 0.0) > 0:
             return Scene(circles)
@@ -104,12 +104,13 @@ def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
     }
 
 
-FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(10)]
+FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(31)]
 
 
-def cost(obstacles: list[Circle], repeats: int = 40) -> float:
-    """Time of a path among obstacles over that with one, each the median of runs side by side."""
-    plain, other = (Solver(Robot.prototype(), Scene(scene)) for scene in ([PUSHED], obstacles))
+def cost(obstacles: list[Circle], cable: str = "uniform", repeats: int = 40) -> float:
+    """Time of a path among obstacles over that with one and a uniform cable; medians of runs side by side."""
+    plain = Solver(Robot.prototype(), Scene([PUSHED]))
+    other = Solver(replace(Robot.prototype(), cable=cable), Scene(obstacles))
     times = np.array([(path_times(plain), path_times(other)) for _ in range(repeats)])
     mean_plain, mean_other = np.median(times, axis=0).mean(axis=1)
     return float(mean_other / mean_plain)
@@ -147,64 +148,69 @@ def path_times(solver: Solver) -> list[float]:
     return times
 
 
-def main() -> None:
-    """Measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=200_000)
-    parser.add_argument("--rivals", type=int, default=200, help="steps compared with IPOPT")
-    parser.add_argument("--json", type=Path)
-    arguments = parser.parse_args()
+def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
+    """Median time of a robot's step on the contact mix alone, in a batch on one thread, and on two [µs]."""
+    generator, robot = np.random.default_rng(0), Robot.prototype()
+    scenes = [random_scene(generator, robot, 1) for _ in range(count)]
+    solvers = [Solver(robot, scene) for scene in scenes]
+    batches = [BatchSolver(robot, count, 1, threads) for threads in (1, 2)]
+    for batch in batches:
+        for i, scene in enumerate(scenes):
+            batch.assign(i, scene)
+        batch.rest(range(count))
+    times = np.empty((steps, 3))
+    for k in range(steps):
+        drift = generator.uniform(-0.5, 0.5, count) + (DRIFT if k % 100 < 80 else -3 * DRIFT)
+        commands = np.clip(batches[0].blocks[:, CABLE] + drift, 0, LARGEST_CABLE)
+        starts = [batches[0].equilibrium(i) for i in range(count)]
+        pairs = zip(solvers, starts, commands.tolist(), strict=True)
+        times[k, 0] = sum(timed_step(solver, start, command).microseconds for solver, start, command in pairs) / count
+        for column, batch in enumerate(batches, start=1):
+            begin = time.perf_counter_ns()
+            batch.step(commands)
+            times[k, column] = (time.perf_counter_ns() - begin) / 1e3 / count
+    alone, one, two = np.median(times, axis=0).tolist()
+    return alone - call_overhead(), one, two
 
-    times, statuses, touching, sample = np.empty(arguments.steps), Counter[str](), 0, []
-    for i, step in enumerate(contact_mix(arguments.steps)):
+
+def measure(steps: int, rivals: int) -> dict[str, Any]:
+    """All of the above, by name."""
+    times, statuses, touching = np.empty(steps), Counter[str](), 0
+    sample: list[Timed] = []
+    for i, step in enumerate(contact_mix(steps)):
         times[i] = step.microseconds
         statuses[step.end.status.name] += 1
         in_touch = bool(step.end.contact.any())
         touching += in_touch
-        if in_touch and step.end.status is Status.CONVERGED and i * arguments.rivals // arguments.steps >= len(sample):
+        if in_touch and step.end.status is Status.CONVERGED and i * rivals // steps >= len(sample):
             sample.append(step)
-    in_contact, overhead = touching / arguments.steps, call_overhead()
-    print(f"contact mix: {len(times)} steps, 18 segments, {in_contact:.0%} in contact; {dict(statuses)}")
-    quantiles = {name: float(np.percentile(times, q)) for name, q in (("median", 50), ("p95", 95), ("p99", 99))}
-    print(f"  mean {times.mean():.2f} µs, " + ", ".join(f"{name} {value:.1f}" for name, value in quantiles.items()))
-    print(f"  of it the call from Python {overhead:.2f} µs; inside the kernel: mean {times.mean() - overhead:.2f} µs")
-
+    overhead = call_overhead()
     kernel, reference = reference_times(sample)
-    ratio = float(np.median(reference / kernel))
-    print(f"CasADi/IPOPT on {len(kernel)} of these steps in contact: median {np.median(reference) / 1e3:.2f} ms")
-    print(f"  ratio to the kernel: median {ratio:.0f}, of the means {reference.mean() / kernel.mean():.0f}")
-
     means = growth((9, 18, 36, 72, 144, 288))
-    exponent = float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0])
-    print("segments: " + ", ".join(f"{n}: {mean:.1f} µs" for n, mean in means.items()) + f"; growth n^{exponent:.2f}")
-
-    far, spring, cold, memo = cost([PUSHED, *FAR]), cost([SPRUNG]), cold_ratio(), memo_ratio()
-    print(
-        f"a step costs {far:.2f} times as much with ten far obstacles, {spring:.2f} times with the obstacle on a spring"
-    )
-    print(f"a cold solve of the end of the path costs {cold:.0f} warm steps")
-    print(f"a warm step takes {memo:.1f} times as long as its replay from the memo")
-
-    if arguments.json:
-        report = {
-            "steps": len(times),
-            "in_contact": in_contact,
-            "statuses": statuses,
-            "mean_us": float(times.mean()),
-            **{f"{name}_us": value for name, value in quantiles.items()},
-            "call_overhead_us": overhead,
-            "kernel_mean_us": float(times.mean()) - overhead,
-            "ipopt_median_ms": float(np.median(reference)) / 1e3,
-            "ipopt_ratio": ratio,
-            "segments_mean_us": means,
-            "growth_exponent": exponent,
-            "far_ratio": far,
-            "spring_ratio": spring,
-            "cold_ratio": cold,
-            "memo_ratio": memo,
-        }
-        arguments.json.write_text(json.dumps(report, indent=2) + "\n")
-
-
-if __name__ == "__main__":
-    main()
+    alone, one, two = batch_times(256)
+    return {
+        "steps": steps,
+        "in_contact": touching / steps,
+        "statuses": dict(statuses),
+        "mean_us": float(times.mean()),
+        **{f"{name}_us": float(np.percentile(times, q)) for name, q in (("median", 50), ("p95", 95), ("p99", 99))},
+        "call_overhead_us": overhead,
+        "kernel_mean_us": float(times.mean()) - overhead,
+        "ipopt_median_ms": float(np.median(reference)) / 1e3,
+        "ipopt_ratio": float(np.median(reference / kernel)),
+        "segments_mean_us": {str(n): mean for n, mean in means.items()},
+        "growth_exponent": float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0]),
+        "sliding_ratio": cost([PUSHED], cable="sliding"),
+        "obstacles_ratio": {str(n): cost([PUSHED, *FAR[: n - 1]]) for n in (2, 11, 32)},
+        "far_ratio": cost([PUSHED, *FAR[:10]]),
+        "spring_ratio": cost([SPRUNG]),
+        "cold_ratio": cold_ratio(),
+        "memo_ratio": memo_ratio(),
+        "batch_256": {
+            "alone_us": alone,
+            "one_thread_us": one,
+            "two_threads_us": two,
+            "cost": one / alone,
+            "speedup": one / two,
+        },
+    }

@@ -1,0 +1,126 @@
+"""Steps a second of the environments and of a learner on them, beside peers measured in the same run."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+
+from agents.config import TrainConfig
+from agents.ppo import learner
+from agents.sb3_adapter import FleetVecEnv
+
+OURS, PEER = "CCR/PushObstacle-v0", "Pendulum-v1"
+ROUNDS = 7  # of which the median counts
+
+
+class IdleVecEnv(FleetVecEnv):
+    """The same spaces and the same episodes, in which nothing happens: what the learner costs by itself."""
+
+    def __init__(self, env_id: str, n_envs: int) -> None:
+        super().__init__(env_id, n_envs, seed=0)
+        self._still = np.asarray(super().reset())
+        self._steps, self._length = 0, self.get_attr("max_episode_steps")[0]
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Nothing, and the end of all episodes at once."""
+        self._steps += 1
+        ended = self._steps % self._length == 0
+        end = {"terminal_observation": self._still[0], "TimeLimit.truncated": True}
+        dones = np.full(self.num_envs, ended)
+        infos = [dict(end) if ended else {} for _ in range(self.num_envs)]
+        return self._still, np.zeros(self.num_envs, np.float32), dones, infos
+
+
+def rates(runs: dict[str, Callable[[], int]]) -> dict[str, float]:
+    """Steps a second of some runs, each of which returns its number of steps; medians of rounds side by side."""
+    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    steps = {}
+    for _ in range(ROUNDS):
+        for name, run in runs.items():
+            begin = time.perf_counter()
+            steps[name] = run()
+            seconds[name].append(time.perf_counter() - begin)
+    return {name: steps[name] / float(np.median(times)) for name, times in seconds.items()}
+
+
+def single(env_id: str, steps: int = 6400, **kwargs: Any) -> Callable[[], int]:
+    """A run of one environment through ``gymnasium.make``, resets included."""
+    env = gymnasium.make(env_id, **kwargs)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(1000)]
+
+    def run() -> int:
+        for i in range(steps):
+            *_, terminated, truncated, _ = env.step(actions[i % len(actions)])
+            if terminated or truncated:
+                env.reset()
+        return steps
+
+    return run
+
+
+def vector(env_id: str, count: int, mode: str, steps: int = 0, **kwargs: Any) -> Callable[[], int]:
+    """A run of a vector environment, resets included: two of our episodes, or as many steps as are asked for."""
+    env = gymnasium.make_vec(env_id, count, vectorization_mode=mode, **kwargs)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(64)]
+    steps = steps or 130
+
+    def run() -> int:
+        for i in range(steps):
+            env.step(actions[i % len(actions)])
+        return count * steps
+
+    return run
+
+
+def environments(counts: tuple[int, ...] = (1, 4, 16, 64, 256, 1024)) -> dict[str, Any]:
+    """Single and vector environments beside Pendulum."""
+    ours = single(OURS, obs_mode="flat")
+    alone = rates({"ours": ours, "peer": single(PEER)})
+    runs = {f"{count} × {threads}": _ours(count, threads) for count in counts for threads in (1, 2)}
+    many = rates({**runs, "peer": vector(PEER, 256, "sync", steps=40)})
+    return {
+        "single_steps_per_s": alone["ours"],
+        "single_pendulum_steps_per_s": alone["peer"],
+        "single_ratio": alone["ours"] / alone["peer"],
+        "vector_steps_per_s": {name: many[name] for name in runs},
+        "sync_256_pendulum_steps_per_s": many["peer"],
+        "vector_256_ratio": {str(threads): many[f"256 × {threads}"] / many["peer"] for threads in (1, 2)},
+    }
+
+
+def _ours(count: int, threads: int) -> Callable[[], int]:
+    return vector(OURS, count, "vector_entry_point", threads=threads, obs_mode="flat")
+
+
+def learning(steps: int = 40_960) -> dict[str, float]:
+    """Frames a second of PPO with the default settings, on our environment and on the idle one."""
+    torch.set_num_threads(1)
+    config = TrainConfig()
+    models = {
+        "ours": learner(FleetVecEnv(OURS, config.envs, 0), config),
+        "idle": learner(IdleVecEnv(OURS, config.envs), config),
+    }
+    found = rates({name: _learn(model, steps) for name, model in models.items()})
+    return {
+        "ppo_frames_per_s": found["ours"],
+        "ppo_idle_frames_per_s": found["idle"],
+        "ppo_ratio": found["ours"] / found["idle"],
+    }
+
+
+def _learn(model: PPO, steps: int) -> Callable[[], int]:
+    def run() -> int:
+        before = model.num_timesteps
+        model.learn(steps, reset_num_timesteps=False)
+        return model.num_timesteps - before
+
+    return run
