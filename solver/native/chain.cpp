@@ -213,7 +213,7 @@ void Chain<Model>::survey(double* gaps) const {
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
     const Position moved = mount_of_[j] < 0 ? Position{} : displacements_[mount_of_[j]];
     ccr::measure_gaps(obstacles_[j], points_, moved, gaps);
-    for (std::size_t k = 0; k < points_.size(); ++k)
+    for (std::size_t k = 0; k < points_.size() && !obstacles_[j].everywhere; ++k)
       if (!obstacles_[j].touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
     gaps += points_.size();
   }

@@ -26,6 +26,7 @@ struct Obstacle {
   double radius;                         // of that disc; infinite for a half-plane
   double fineness;                       // smallest radius of its surface; infinite for a half-plane
   std::vector<unsigned char> touchable;  // (lines, positions): whether a point can touch it
+  bool everywhere;                       // whether all of them can
   bool mounted;                          // on a spring; fixed otherwise
   Mat<2, 2> stiffness;                   // of its spring [N/mm]
 };
