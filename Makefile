@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test bench soak lint clean
+.PHONY: demo test bench instructions soak lint clean
 
 demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controller, write a figure and a video to runs/demo
 	$(BIN)/ccr-gym train --run runs/demo
@@ -19,6 +19,9 @@ lint: $(INSTALL)
 
 bench: $(INSTALL)
 	$(BIN)/ccr-gym bench
+
+instructions: $(INSTALL)  ## count instructions of the kernel (needs valgrind)
+	$(BIN)/python benchmarks/instructions.py
 
 soak: $(INSTALL)
 	$(BIN)/python -m pytest tests/solver/test_soak.py --soak 167000

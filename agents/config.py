@@ -21,7 +21,7 @@ class TrainConfig:
     """Environment steps to train for."""
     envs: int = 32
     """Environments stepped side by side."""
-    threads: int = 1
+    threads: int = 2
     """Threads of the solver; results do not depend on them."""
     rollout: int = 64
     """Steps of each environment between updates."""

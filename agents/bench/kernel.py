@@ -58,9 +58,9 @@ def timed_step(solver: Solver, start: Equilibrium, command: float) -> Timed:
     )
 
 
-def contact_mix(steps: int, seed: int = 0) -> Iterator[Timed]:
+def contact_mix(steps: int, seed: int = 0, robot: Robot = Robot.prototype()) -> Iterator[Timed]:  # noqa: B008 - frozen
     """Random increments of ±0.5 mm with a drift towards pulling, 100 steps a scene."""
-    generator, robot = np.random.default_rng(seed), Robot.prototype()
+    generator = np.random.default_rng(seed)
     for _ in range(steps // STEPS_PER_SCENE):
         solver = Solver(robot, random_scene(generator, robot))
         now = solver.rest()

@@ -85,7 +85,7 @@ def environments(counts: tuple[int, ...] = (1, 4, 16, 64, 256, 1024)) -> dict[st
     """Single and vector environments beside Pendulum."""
     ours = single(OURS, obs_mode="flat")
     alone = rates({"ours": ours, "peer": single(PEER)})
-    runs = {f"{count} × {threads}": _ours(count, threads) for count in counts for threads in (1, 2)}
+    runs = {f"{count} × {threads}": _ours(count, threads) for count in sorted({*counts, 256}) for threads in (1, 2)}
     many = rates({**runs, "peer": vector(PEER, 256, "sync", steps=40)})
     return {
         "single_steps_per_s": alone["ours"],

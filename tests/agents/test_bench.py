@@ -1,0 +1,28 @@
+"""The benchmarks run; what they find is not tested."""
+
+import pytest
+
+from agents.bench import kernel, report, throughput
+
+
+@pytest.fixture(autouse=True)
+def once(monkeypatch):
+    monkeypatch.setattr(throughput, "ROUNDS", 1)
+
+
+def test_environments(capsys):
+    found = throughput.environments((1, 4))
+    assert found["single_steps_per_s"] > 0
+    assert found["vector_steps_per_s"].keys() == {"1 × 1", "1 × 2", "4 × 1", "4 × 2", "256 × 1", "256 × 2"}
+    report.show("environments", found)
+    assert "vector_256_ratio 2" in capsys.readouterr().out
+
+
+def test_learning():
+    assert 0 < throughput.learning(2048)["ppo_ratio"] < 2
+
+
+def test_kernel():
+    assert len(list(kernel.contact_mix(200))) == 200
+    assert min(kernel.batch_times(4, steps=3)) > 0
+    assert kernel.cost([kernel.PUSHED], repeats=2) > 0
