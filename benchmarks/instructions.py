@@ -21,15 +21,8 @@ from solver import Robot
 
 HERE = Path(__file__).parent
 NATIVE, RECORDED = HERE.parent / "solver" / "native", HERE / "instructions.json"
-FLAGS = [
-    "-std=c++20",
-    "-O3",
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-fno-signed-zeros",
-    "-ffp-contract=off",
-    "-Wno-psabi",
-]
+MATH = ["-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=off"]
+FLAGS = ["-std=c++20", "-O3", *MATH, "-Wno-psabi"]
 STEPS = 2000
 
 

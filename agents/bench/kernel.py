@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from timeit import timeit
 from typing import Any
 
@@ -131,10 +132,8 @@ def memo_ratio(repeats: int = 21) -> float:
     for command in PATH[:30]:
         now = solver.step(now, float(command))
     memo.step(now, 7.75)
-    both = [
-        [timeit(lambda who=who: who.step(now, 7.75), number=1000) for who in (solver, memo)] for _ in range(repeats)
-    ]
-    warm, replay = np.median(both, axis=0)
+    steps = [partial(who.step, now, 7.75) for who in (solver, memo)]
+    warm, replay = np.median([[timeit(step, number=1000) for step in steps] for _ in range(repeats)], axis=0)
     return float(warm / replay)
 
 
