@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from agents.bench import kernel, throughput
+from agents.bench import kernel, peers, throughput
 from agents.config import BenchConfig
 
 
@@ -16,6 +16,7 @@ def bench(config: BenchConfig) -> dict[str, Any]:
         "kernel": kernel.measure(config.steps, config.rivals),
         "environments": throughput.environments(),
         "learning": throughput.learning(),
+        "peers": peers.measure(),
     }
     for name, part in found.items():
         show(name, part)

@@ -37,11 +37,12 @@ std::vector<ccr::Obstacle> read_obstacles(const Kinds& kinds, const Input& param
     obstacle.center = {{extent[0], extent[1]}};
     obstacle.radius = extent[2];
     obstacle.fineness = extent[3];
-    obstacle.everywhere = std::all_of(obstacle.touchable.begin(), obstacle.touchable.end(), [](auto can) { return can; });
     std::copy_n(stiffness.data() + 4 * i, 4, obstacle.stiffness.v.begin());
     obstacle.law = reinterpret_cast<ccr::Law>(laws[i]);
     obstacle.mounted = obstacle.stiffness(0, 0) > 0;
     obstacle.touchable.assign(touchable.data() + points * i, touchable.data() + points * (i + 1));
+    const auto& can = obstacle.touchable;
+    obstacle.everywhere = std::find(can.begin(), can.end(), 0) == can.end();
   }
   return obstacles;
 }
