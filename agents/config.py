@@ -94,6 +94,8 @@ class BenchConfig:
     """Steps of the contact mix."""
     rivals: int = 200
     """Of these, how many IPOPT repeats."""
+    seeds: int = 1
+    """Seeds that PPO is trained with."""
     json: Path | None = Path("runs/bench.json")
     """File the numbers are written to."""
 

@@ -15,7 +15,7 @@ def bench(config: BenchConfig) -> dict[str, Any]:
     found = {
         "kernel": kernel.measure(config.steps, config.rivals),
         "environments": throughput.environments(),
-        "learning": throughput.learning(),
+        "learning": throughput.learning() | throughput.solving(config.seeds),
         "peers": peers.measure(),
     }
     for name, part in found.items():
@@ -30,8 +30,14 @@ def show(title: str, numbers: dict[str, Any]) -> None:
     """Print a part of the report."""
     table = Table(title=title, show_header=False)
     for name, value in _flat(numbers):
-        table.add_row(name, f"{value:,.4g}" if isinstance(value, float) else str(value))
+        table.add_row(name, _text(value))
     Console().print(table)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(_text, value))
+    return f"{value:,.4g}" if isinstance(value, float) else str(value)
 
 
 def _flat(numbers: dict[str, Any]) -> list[tuple[str, Any]]:

@@ -1,7 +1,9 @@
 """Steps a second of the environments and of a learner on them, beside peers measured in the same run."""
 
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -10,8 +12,9 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from agents.config import TrainConfig
-from agents.ppo import learner
+from agents.config import EVALUATION_SEED, TrainConfig
+from agents.evaluate import run_episodes, summarize
+from agents.ppo import PPOPolicy, learner, train
 from agents.sb3_adapter import FleetVecEnv
 
 OURS, PEER = "CCR/PushObstacle-v0", "Pendulum-v1"
@@ -115,6 +118,20 @@ def learning(steps: int = 40_960) -> dict[str, float]:
         "ppo_idle_frames_per_s": found["idle"],
         "ppo_ratio": found["ours"] / found["idle"],
     }
+
+
+def solving(seeds: int, episodes: int = 60) -> dict[str, Any]:
+    """Wall time of training with the default settings, and the median final force error afterwards, for some seeds."""
+    found: dict[str, Any] = {"train_s": [], "median_final_error": []}
+    for seed in range(seeds):
+        with tempfile.TemporaryDirectory() as folder:
+            config = TrainConfig(run=Path(folder), seed=seed)
+            begin = time.perf_counter()
+            train(config, progress=False)
+            found["train_s"].append(time.perf_counter() - begin)
+            played = run_episodes(PPOPolicy(config.run), config.env_id, EVALUATION_SEED, episodes)
+            found["median_final_error"].append(summarize("PPO", played).median_error)
+    return found
 
 
 def _learn(model: PPO, steps: int) -> Callable[[], int]:

@@ -147,13 +147,21 @@ void Chain<Model>::load_springs(const std::vector<Position>& mounts) {
 template <class Model>
 Control Chain<Model>::relaxed(const Command& command) {
   const double pull = command.cable / robot_.segments, length = command.length / robot_.segments;
-  Control control{};
-  if constexpr (Model::kSliding) control[0] = pull / robot_.offset;
-  for (int i = 0; i <= (Model::kSliding ? limits::kRelaxIterations : 0); ++i) {
-    Model::bend(1, control.v.data(), pull, length, robot_.offset, one_);
-    if constexpr (Model::kSliding) control[0] -= (one_[0].taken - pull) / one_[0].taken_slope;
+  if (command.cable == relaxed_at_.cable && command.length == relaxed_at_.length) return relaxed_;
+  relaxed_at_ = command;
+  relaxed_ = {};
+  if constexpr (Model::kSliding) relaxed_[0] = pull / robot_.offset;
+  for (int i = 0; i <= limits::kRelaxIterations; ++i) {
+    Model::bend(1, relaxed_.v.data(), pull, length, robot_.offset, one_);
+    if constexpr (!Model::kSliding) {
+      break;
+    } else {
+      const double change = (one_[0].taken - pull) / one_[0].taken_slope;
+      relaxed_[0] -= change;
+      if (std::abs(change) <= limits::kRelaxed * std::abs(relaxed_[0])) break;
+    }
   }
-  return control;
+  return relaxed_;
 }
 
 template <class Model>

@@ -186,7 +186,9 @@ class Chain {
   double pull_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
   double objective_ = 0, energy_ = 0, steepest_ = 0;
   typename Model::Bends bends_;
-  typename Model::Bends one_;
+  typename Model::Bends one_;  // a segment that nothing touches, relaxed under the last command asked about
+  Command relaxed_at_{-1, 0};
+  Control relaxed_{};
   std::vector<Position> origin_;  // nodes of the shape looked around from
   std::vector<Position> mount_origin_;  // mounts of that shape
   std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach
