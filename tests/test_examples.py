@@ -1,0 +1,51 @@
+import re
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stable_baselines3 import PPO
+
+from agents.config import TrainConfig
+from agents.sb3_adapter import FleetVecEnv
+from ccr_gym import ENV_IDS
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_ppo_trains_and_tells_its_error():
+    command = [sys.executable, str(EXAMPLES / "ppo.py"), "--steps", "2048", "--envs", "16", "--epochs", "1"]
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    training, test = run.stdout.splitlines()[-2:]
+    assert re.fullmatch(r"last 32 training episodes: median final error \d+\.\d\d%", training)
+    assert re.fullmatch(r"mean action, 100 unseen scenes: median final error \d+\.\d\d%", test)
+
+
+def test_in_ppo_the_last_observation_of_an_episode_follows_its_last_step():
+    example = runpy.run_path(str(EXAMPLES / "ppo.py"))
+    experience = example["Experience"](example["Args"](envs=3))
+    for step in range(1, 65):
+        _, following, ended = experience._step(np.ones((3, 1)))
+        assert bool(ended.all()) == bool(ended.any()) == (step == 64)
+    assert (following[:, 0] > 0).all()  # the cable is pulled
+    assert (experience.observation[:, 0] == 0).all()  # and slack in the next episode
+
+
+@pytest.mark.parametrize("env_id", ["CCR/LoadCell-v0", "CCR/PushObstacle-v0"])
+def test_the_settings_for_the_zoo_are_those_of_the_command(env_id):
+    yaml = pytest.importorskip("yaml")
+    settings = yaml.safe_load((EXAMPLES / "rl_zoo_ppo.yml").read_text())
+    assert settings.keys() <= set(ENV_IDS)
+    told, config = settings[env_id], TrainConfig()
+    assert told.pop("env_wrapper") == "gymnasium.wrappers.FlattenObservation"
+    assert told.pop("normalize") is True
+    assert (told.pop("n_timesteps"), told.pop("n_envs")) == (config.steps, config.envs)
+    assert told.pop("learning_rate") == f"lin_{config.learning_rate}"
+    told["policy_kwargs"] = eval(told["policy_kwargs"])
+    assert told["policy_kwargs"] == {"net_arch": [config.width] * 2, "log_std_init": config.log_std_init}
+    model = PPO(env=FleetVecEnv(env_id, 1), device="cpu", **told | {"batch_size": told["n_steps"]})
+    assert (model.n_steps, told["batch_size"], model.n_epochs) == (config.rollout, config.batch_size, config.epochs)
+    assert (model.gamma, model.gae_lambda) == (config.gamma, config.gae_lambda)
