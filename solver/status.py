@@ -7,7 +7,8 @@ class Status(IntEnum):
     """How a step of the solver ended. Every verdict comes with a valid equilibrium.
 
     A step that both snaps and stalls or jams is reported by how it ended. A small snap that a single increment carries
-    past, with no node moving more than 0.5 mm + 16 times the increment, is not told from ordinary motion.
+    past, with no node moving more than 0.5 mm + 16 times the increment and 8.5 mm at most, is not told from ordinary
+    motion.
     """
 
     CONVERGED = 0

@@ -247,7 +247,8 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
     iterations += verdict.iterations;
     if (!verdict.converged) return Move::kRejected;
   }
-  if (!passable(kMoveOffset + kMoveSlope * apart(present_.command, command))) return Move::kRejected;
+  if (!passable(std::min(kMoveOffset + kMoveSlope * apart(present_.command, command), kMoveLargest)))
+    return Move::kRejected;
   newton_.chain.reduced_gradient(trial_.active);
   trial_tension_ = newton_.chain.tension(trial_.active);
   const bool pulled = command.cable > present_.command.cable && command.length == present_.command.length;

@@ -42,10 +42,11 @@ inline constexpr double kMeasureDamping = 1.0; // where closeness of shapes is m
 
 // Continuation.
 inline constexpr double kPretension = 0.05;    // cable displacement below which a touching robot is not slackened
-inline constexpr double kLargestStep = 0.5;    // cable displacement, or half the insertion, of one sub-step
+inline constexpr double kLargestStep = 0.75;   // cable displacement, or half the insertion, of one sub-step
 inline constexpr double kSmallestStep = 1e-4;
 inline constexpr double kMoveOffset = 0.5;     // a node moves at most kMoveOffset + kMoveSlope * |step| in a sub-step
 inline constexpr double kMoveSlope = 16.0;
+inline constexpr double kMoveLargest = 8.5;    // and at most this, whatever the step
 inline constexpr double kSweepDepth = 0.125;   // a point's path may cut this deep into an obstacle, and is looked at
 inline constexpr double kSweepStride = 0.5;    // this often: fractions of the smallest radius of the obstacle's surface
 inline constexpr int kSubSteps = 400;          // beside those of the largest size

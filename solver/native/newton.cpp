@@ -60,13 +60,13 @@ bool Newton<Model>::convexify(const ActiveSet& active) {
 }
 
 template <class Model>
-double Newton<Model>::cap(double largest, const Direction<Model>& step) const {
+double Newton<Model>::size(const Direction<Model>& step) const {
   double longest = 0;
   for (const State<Model>& d : step.states) longest = std::max({longest, std::abs(d[0]), std::abs(d[1])});
   longest /= chain.robot().max_length;
   for (const Position& d : step.mounts) longest = std::max(longest, norm(d) / chain.robot().max_length);
   for (const Control& d : step.controls) longest = std::max(longest, std::abs(d[0]));
-  return longest > largest ? largest / longest : 1.0;
+  return longest;
 }
 
 template <class Model>
@@ -104,7 +104,7 @@ void blend(const ActiveSet& from, double scale, ActiveSet& to) {
 template <class Model>
 double Newton<Model>::search(const Iterate& at, const ActiveSet& target, double& weight) {
   trial_.command = at.command;
-  if (cap(kDescentCap, step_) == 1) {
+  if (size_ <= kDescentCap) {
     advance(at, 1, step_, trial_);
     if (chain.evaluate(trial_)) return 1;
     return 0;
@@ -117,7 +117,7 @@ double Newton<Model>::search(const Iterate& at, const ActiveSet& target, double&
   for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
   const double before = merit(weight);
   const double expected = std::min(slope - (before - chain.energy()), 0.0);
-  double scale = cap(kNewtonCap, step_);
+  double scale = std::min(1.0, kNewtonCap / size_);
   for (int backtracks = 0; backtracks <= kBacktracks; ++backtracks, scale /= 2) {
     advance(at, scale, step_, trial_);
     if (chain.evaluate(trial_) && merit(weight) <= before + kArmijo * scale * expected) return scale;
@@ -150,13 +150,14 @@ Verdict Newton<Model>::solve(Iterate& at) {
     }
     if (!convex(at.active, kPenalties) || !contacts_.solve(chain, hessian_, target, step_)) return verdict;
 
+    size_ = size(step_);
     const double scale = search(at, target, weight);
     if (scale == 0) return verdict;
     std::swap(at.controls, trial_.controls);
     std::swap(at.mounts, trial_.mounts);
     blend(at.active, scale, target);
     at.active = target;
-    close = cap(kNewtonClose, step_) == 1;
+    close = size_ <= kNewtonClose;
   }
   return verdict;
 }
@@ -175,7 +176,7 @@ bool Newton<Model>::restore(Iterate& at) {
     if (on_surface(at.active, kDescentFeasibility)) return true;
     ActiveSet held = at.active;
     if (!contacts_.restore(chain, hessian_, held, correction_)) return false;
-    if (!(cap(kDescentCap, correction_) == 1)) return false;
+    if (!(size(correction_) <= kDescentCap)) return false;
     advance(at, 1, correction_, at);
     if (!chain.evaluate(at)) return false;
   }
@@ -213,7 +214,7 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   ActiveSet target = at.active;
   if (!contacts_.solve(chain, hessian_, target, step_)) return verdict;
   const double before = chain.energy();
-  double scale = cap(largest, step_);
+  double scale = std::min(1.0, largest / size(step_));
   trial_.command = at.command;
   const ActiveSet touching = closed(target);
   // Restorations are measured by closeness: near a fold the energy hardly resists the motion that ends the branch.

@@ -42,13 +42,14 @@ class Newton {
   bool on_surface(const ActiveSet& active, double tolerance) const;
   bool convex(const ActiveSet& active, int penalties);
   bool convexify(const ActiveSet& active);
-  double cap(double largest, const Direction<Model>& step) const;
+  double size(const Direction<Model>& step) const;
   double merit(double weight) const;
   double search(const Iterate& at, const ActiveSet& target, double& weight);
 
   Hessian<Model> hessian_;
   Contacts<Model> contacts_;
   Direction<Model> step_, correction_;
+  double size_ = 0;  // of `step_`
   Iterate trial_;
   double damping_ = 0;
 };
