@@ -39,7 +39,7 @@ class Batch {
   }
 
  private:
-  static constexpr int kChunk = 4;   // robots taken at a time
+  static constexpr int kChunk = 2;   // robots taken at a time
   static constexpr int kAlone = 16;  // robots that are not worth waking a thread for
 
   std::vector<std::vector<Obstacle>> scenes_;
