@@ -94,7 +94,7 @@ def bench(config: BenchConfig) -> None:
 
 
 def reproduce(config: ReproduceConfig) -> None:
-    """Regenerate the paper's planar figures and table, and check its claims in numbers."""
+    """Regenerate the paper's figures and table, and check its claims in numbers."""
     from agents.reproduce import reproduce as run
 
     for claim in run(config.out):

@@ -102,7 +102,7 @@ class BenchConfig:
 
 @dataclass(frozen=True, slots=True)
 class ReproduceConfig:
-    """Regenerate the paper's planar figures and table, and check its claims in numbers."""
+    """Regenerate the paper's figures and table, and check its claims in numbers."""
 
     out: Path = Path("runs/paper")
     """Folder for paper.png and paper.json."""

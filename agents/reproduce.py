@@ -1,10 +1,11 @@
-"""The paper's planar results again: what its figures and its table show, and which of its claims hold."""
+"""The paper's results again: what its figures and its table show, and which of its claims hold."""
 
 import json
 import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,6 +16,7 @@ from agents.figures import draw_shape
 from solver import Equilibrium, Robot, Scene, Solver
 from solver.forces import VirtualWork
 from solver.free import fitted_slopes, free_nodes, tip_slopes
+from solver.spatial import SpatialEquilibrium, SpatialReferenceSolver, SpatialRobot
 
 ROBOT = Robot.prototype(max_tension=math.inf)
 FIT_RANGE = (0.0, 8.0)  # cable displacements the straight lines of Fig. 7 are fitted over [mm]
@@ -59,7 +61,7 @@ def table_1(estimator: VirtualWork, slopes: np.ndarray) -> np.ndarray:
 
 
 def claims() -> list[Claim]:
-    """Every numerical claim about the plane, checked."""
+    """Every claim in numbers, checked."""
     estimator, slopes = calibrated()
     column = table_1(estimator, slopes)
     deviation = np.abs(column - paper.THEORETICAL).max()
@@ -68,6 +70,7 @@ def claims() -> list[Claim]:
     contact = pulled(paper.FIG_4B, 5.0).contact
     touching = np.flatnonzero(contact.any(axis=(0, 1))).tolist()
     exact = np.array([_gain(estimator, cable) for cable in (2.2, 7.0)])
+    between = bent((5.0, 5.0)).points[0] @ [math.sqrt(0.5), -math.sqrt(0.5), 0.0]
     seconds = {name: _seconds(scene) for name, scene in (("one", paper.FIG_4A), ("two", paper.FIG_4B))}
     return [
         Claim(
@@ -98,6 +101,12 @@ def claims() -> list[Claim]:
             "with one straight line it cannot change",
         ),
         Claim(
+            "Two cables pulled at once bend the robot in a plane between those of each alone (Fig. 11).",
+            bool(np.ptp(between) < 1e-9),
+            f"pulled by 5 mm each, the backbone stays within {np.ptp(between):.0e} mm of the plane at 45°; "
+            f"eq. 13 is met to {bent((5.0, 5.0)).residuals()[0]:.0e} rad²/mm",
+        ),
+        Claim(
             "By specifying the gradient, the convergence time could be further reduced.",
             seconds["one"] < paper.SECONDS_PER_SOLVE,
             f"a whole pull from rest to 5 mm, 100 equilibria, takes {1e3 * seconds['one']:.1f} ms; the paper's fmincon "
@@ -126,23 +135,25 @@ def _seconds(scene: Scene) -> float:
 
 
 def draw(path: Path) -> None:
-    """Fig. 3b, 4a, 4b, 5, 7, 9, 10a, 10b and Table 1 on one page."""
-    figure, axes = plt.subplots(3, 3, figsize=(14, 13), layout="constrained")
+    """Fig. 3b, 4a, 4b, 5, 7, 9, 10a, 10b, 11 and Table 1 on one page."""
+    figure = plt.figure(figsize=(22, 9), layout="constrained")
+    axes = [figure.add_subplot(2, 5, k + 1) for k in range(9)]
     for cable in (2.0, 5.0, 8.0, 12.0):
-        draw_shape(axes[0, 0], pulled(Scene(), cable))
-    axes[0, 0].set_title("Fig. 3b: free profiles, l = 2, 5, 8, 12 mm")
-    for axis, name, scene in ((axes[0, 1], "Fig. 4a", paper.FIG_4A), (axes[0, 2], "Fig. 4b", paper.FIG_4B)):
+        draw_shape(axes[0], pulled(Scene(), cable))
+    axes[0].set_title("Fig. 3b: free profiles, l = 2, 5, 8, 12 mm")
+    for axis, name, scene in ((axes[1], "Fig. 4a", paper.FIG_4A), (axes[2], "Fig. 4b", paper.FIG_4B)):
         cable = 8.0 if scene is paper.FIG_4A else 5.0
         draw_shape(axis, pulled(scene, cable))
         axis.set_title(f"{name}: l = {cable:.0f} mm")
-    _draw_multipliers(axes[1, 0])
-    _draw_tip(axes[1, 1])
-    draw_shape(axes[1, 2], pulled(paper.load_cell(26.0), 5.0))
-    axes[1, 2].set_title("Fig. 9: load cell at 26 mm, l = 5 mm")
-    _draw_forces(axes[2, 0])
-    _draw_contact_points(axes[2, 1])
-    _draw_errors(axes[2, 2])
-    figure.savefig(path, dpi=120)
+    _draw_multipliers(axes[3])
+    _draw_tip(axes[4])
+    draw_shape(axes[5], pulled(paper.load_cell(26.0), 5.0))
+    axes[5].set_title("Fig. 9: load cell at 26 mm, l = 5 mm")
+    _draw_forces(axes[6])
+    _draw_contact_points(axes[7])
+    _draw_errors(axes[8])
+    _draw_space(figure.add_subplot(2, 5, 10, projection="3d"))
+    figure.savefig(path, dpi=100)
     plt.close(figure)
 
 
@@ -185,6 +196,25 @@ def _draw_contact_points(axis: Axes) -> None:
         axis.plot(loads, per_load * loads, "o-", ms=3, label=f"node {node + 1}: {per_load:.3f} per load")
     axis.set(title="Fig. 10b: eq. 11 at several contact points", xlabel="cable load [g]", ylabel="force [g]")
     axis.legend(fontsize=8)
+
+
+def _draw_space(axis: Any) -> None:
+    for cables in ((5.0, 0.0), (0.0, 5.0), (5.0, 5.0)):
+        backbone, *holes = bent(cables).points
+        axis.plot(*backbone.T, lw=2.5, label=f"pulls {cables[0]:.0f} and {cables[1]:.0f} mm")
+        for hole in holes:
+            axis.plot(*hole.T, color="0.6", lw=0.8)
+    axis.set(title="Fig. 11: two cables in space", xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
+    axis.set(xlim=(-10, 80), ylim=(-10, 80), zlim=(0, 180), xticks=(0, 40, 80), yticks=(0, 40, 80))
+    axis.set_box_aspect((1, 1, 2), zoom=0.85)
+    axis.view_init(elev=25, azim=-60)
+    axis.legend(fontsize=8, loc="lower left", bbox_to_anchor=(-0.25, 0.0))
+
+
+def bent(cables_mm: tuple[float, float]) -> SpatialEquilibrium:
+    """The robot in space with both cables pulled (eq. 13)."""
+    solver = SpatialReferenceSolver(SpatialRobot.prototype())
+    return solver.step(solver.rest(), cables_mm)
 
 
 def _draw_errors(axis: Axes) -> None:

@@ -25,5 +25,6 @@ def test_the_command_writes_a_page_and_a_verdict_on_every_claim(tmp_path, monkey
     verdicts = {claim["sentence"]: claim["holds"] for claim in report}
     assert verdicts["The multipliers peak at nodes 11 and 17, the contacts of Fig. 4b (Fig. 5)."]
     assert verdicts["Theoretical column of Table 1."]
+    assert verdicts["Two cables pulled at once bend the robot in a plane between those of each alone (Fig. 11)."]
     assert capsys.readouterr().out.count("holds: ") >= 3
     assert (tmp_path / "paper.png").stat().st_size > 50_000
