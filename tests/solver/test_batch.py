@@ -1,5 +1,8 @@
 """A batch moves every robot as the solver would, whatever the company and the threads."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -67,6 +70,30 @@ def test_reaches_is_a_steady_pull():
                 break
         assert reached == expected
     assert 0 < found.sum() < 60
+
+
+FORKED = """
+import os
+import numpy as np
+from solver import Robot, Scene
+from solver.batch import BatchSolver
+batch = BatchSolver(Robot.prototype(), 64, 0, threads=2)
+for i in range(64):
+    batch.assign(i, Scene())
+batch.rest(range(64))
+batch.step(np.full(64, 1.0))
+child = os.fork()
+batch.step(np.full(64, 2.0))
+if child == 0:
+    os._exit(0 if np.all(batch.blocks[:, 0] == 2) else 1)
+assert os.waitpid(child, 0)[1] == 0
+assert np.all(batch.blocks[:, 0] == 2)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_forked_process_has_threads_of_its_own():
+    subprocess.run([sys.executable, "-W", "ignore", "-c", FORKED], check=True, timeout=60)
 
 
 def test_what_it_refuses():
