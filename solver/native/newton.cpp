@@ -213,7 +213,10 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   if (verdict.converged || !convexify(at.active)) return verdict;
   ActiveSet target = at.active;
   if (!contacts_.solve(chain, hessian_, target, step_)) return verdict;
+  // Energy may rise by what it costs to close gaps that are open by as little as is not told from closed.
   const double before = chain.energy();
+  double allowed = before + kEnergyRoundoff * before;
+  for (int j = 0; j < target.count; ++j) allowed += 2 * kDescentFeasibility * target.multiplier[j];
   double scale = std::min(1.0, largest / size(step_));
   trial_.command = at.command;
   const ActiveSet touching = closed(target);
@@ -223,7 +226,7 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap that is to push
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
-    if (chain.energy() > before + kEnergyRoundoff * before) continue;
+    if (chain.energy() > allowed) continue;
     std::swap(at.controls, trial_.controls);
     std::swap(at.mounts, trial_.mounts);
     at.active = closed(target);

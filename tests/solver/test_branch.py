@@ -1,6 +1,7 @@
 """Where a branch ends: stall, jam, snap and pretension."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -186,3 +187,18 @@ def test_motor_yields_where_a_release_snaps_to_more_tension_than_it_holds(pulls)
     assert released.cable_mm < 12.15 < hooked.cable_mm
     assert released.tension <= robot.max_tension
     assert certified(released)
+
+
+@pytest.mark.parametrize(("x", "release"), [(67.05, 0.03), (67.1, 0.1), (67.4, 0.31)])
+def test_a_tip_that_rolls_onto_a_circle_is_not_taken_for_jammed(x, release):
+    """Two gaps close at the end of the descent, which costs more energy than is left to win."""
+    robot = replace(Robot.prototype(), cable="sliding")
+    solver = Solver(robot, Scene([Circle(center=(x, 132.6), radius=13.7)]))
+    state = walk(solver, solver.rest(), np.arange(0.5, 12, 0.5).tolist())
+    statuses = set()
+    for cable in np.arange(state.cable_mm - release, 11.0, -release):
+        state = solver.step(state, float(cable))
+        statuses.add(state.status)
+    assert Status.SNAPPED in statuses
+    assert statuses <= {Status.CONVERGED, Status.SNAPPED}
+    assert certified(state)
