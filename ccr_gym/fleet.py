@@ -9,13 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ccr_gym.observation import Observer
-from ccr_gym.reward import ARRAYS, NUMBERS, TERMS, Operations, reward_terms
+from ccr_gym.reward import TERMS, reward_terms
 from ccr_gym.settings import Settings, require
 from ccr_gym.tasks import Assignment, Task, assign
 from solver import Equilibrium, Solver
 from solver.batch import BatchSolver, ReferenceBatch
 from solver.forces import virtual_work
 from solver.layout import CABLE, TENSION
+from solver.operations import ARRAYS, NUMBERS, Operations
 
 ALL = slice(None)
 Which = int | slice | list[int]
@@ -41,6 +42,11 @@ class Reading(NamedTuple):
 
 def _operations(which: Which) -> Operations:
     return NUMBERS if isinstance(which, int) else ARRAYS
+
+
+def _columns(values: np.ndarray, which: Which) -> Any:
+    """The numbers of one robot, or those of many as arrays, each over all of them."""
+    return values.tolist() if isinstance(which, int) else values.T
 
 
 def _plain(value: Any, which: Which) -> Any:
@@ -115,12 +121,14 @@ class Fleet:
         layout, settings, blocks = self._layout, self._settings, self.solver.blocks[which]
         force_true = layout.force(blocks).copy()
         force = _plain(np.hypot(force_true[..., 0], force_true[..., 1]), which)
+        force_est = np.zeros(force_true.shape)
         if force > 0 if isinstance(which, int) else force.any():
-            load, offset = blocks[..., TENSION] - layout.onset(blocks)[..., 0], settings.robot.offset_mm
-            shares = virtual_work(layout.forces(blocks), load, layout.tip_slopes(blocks), offset, settings.friction)
-            force_est = shares.sum(axis=-2)
-        else:
-            force_est = np.zeros(force_true.shape)
+            normal_x, normal_y = _columns(force_true, which)
+            x, y = normal_x - settings.friction * normal_y, normal_y + settings.friction * normal_x
+            slopes = _columns(layout.tip_slopes(blocks), which)
+            load = _plain(blocks[..., TENSION] - blocks[..., layout.onset_at], which)
+            ratio = virtual_work(x, y, load, slopes, settings.robot.offset_mm, _operations(which))
+            force_est[..., 0], force_est[..., 1] = ratio * x, ratio * y
         return Reading(blocks, force_true, force_est, force, _plain(self.desired[which], which))
 
     def observe(self, reading: Reading) -> np.ndarray:
@@ -129,8 +137,8 @@ class Fleet:
 
     def rewards(self, reading: Reading, which: int | slice = ALL) -> tuple[Any, ...]:
         """Terms of the reward of the last step."""
-        clearance, effort = self._layout.clearance(reading.blocks)[..., 0], self._effort[which]
-        told = _plain(clearance, which), _plain(effort, which)
+        clearance = _plain(reading.blocks[..., self._layout.clearance_at], which)
+        told = clearance, _plain(self._effort[which], which)
         return reward_terms(self._settings.weights, reading.force, reading.desired, *told, _operations(which))
 
     def infos(self, reading: Reading, terms: tuple[Any, ...], which: int | slice = ALL) -> dict[str, Any]:

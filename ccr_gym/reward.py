@@ -1,10 +1,11 @@
 """The reward: named terms, and their sum."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+
+from solver.operations import Operations
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,18 +28,6 @@ class RewardWeights:
 
 
 TERMS = tuple(field.name for field in fields(RewardWeights))
-
-
-class Operations(NamedTuple):
-    """What is written once for a number and for an array of them; the bits are the same."""
-
-    minimum: Callable[[Any, Any], Any]
-    maximum: Callable[[Any, Any], Any]
-    where: Callable[[Any, Any, Any], Any]
-
-
-ARRAYS = Operations(np.minimum, np.maximum, np.where)
-NUMBERS = Operations(min, max, lambda condition, yes, no: yes if condition else no)
 
 
 def reward_terms(

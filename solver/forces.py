@@ -5,12 +5,15 @@ two are different quantities: the virtual-work estimate knows the tension and th
 material constants, and is fitted to an experiment through μ; the energy force is that of the model itself.
 """
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from solver.equilibrium import Equilibrium
 from solver.free import clearance, fitted_slopes, free_tension
+from solver.operations import NUMBERS, Operations
 from solver.robot import Robot
 
 
@@ -19,29 +22,22 @@ def force_true(equilibrium: Equilibrium) -> np.ndarray:
     return equilibrium.forces.copy()
 
 
-def virtual_work(
-    forces: np.ndarray,
-    load: np.ndarray,
-    slopes: np.ndarray,
-    offset_mm: float,
-    friction: float,
-) -> np.ndarray:
-    """Forces of the directions of others whose work on the tip is that of a cable load, ``(..., m, 2)`` [N].
+def virtual_work(x: Any, y: Any, load: Any, slopes: Any, offset_mm: float, operations: Operations) -> Any:
+    """How many times a force does the virtual work on the tip that a cable load does: c of ``c F·x' = a P_l φ'``.
 
-    ``Σ c F_j·(1 + μ R)·x' = a P_l φ'`` for the unknown c, with R a quarter turn; zero where the directions do no work
-    against the motion.
+    Zero for a force that does no work against the motion. Of one robot, in numbers, or of many, in arrays ``(N,)``.
 
     Args:
-        forces: Forces that give directions and proportions, ``(..., m, 2)``.
-        load: Cable load P_l, ``(...)`` [N].
-        slopes: Slopes x', φ' of the free tip, ``(..., 3)``.
+        x: Force along x [N].
+        y: Force along y [N].
+        load: Cable load P_l [N].
+        slopes: Slopes of the free tip's x, y and angle [mm, mm, rad per mm].
         offset_mm: Distance a of the cable from the backbone [mm].
-        friction: Ratio μ of tangential to normal force.
+        operations: Those of numbers or those of arrays.
     """
-    x, y = forces[..., 0] - friction * forces[..., 1], forces[..., 1] + friction * forces[..., 0]
-    work = (x * slopes[..., None, 0] + y * slopes[..., None, 1]).sum(axis=-1)
-    scale = offset_mm * load * slopes[..., 2] / np.where(work < 0, work, -np.inf)
-    return np.stack([scale[..., None] * x, scale[..., None] * y], axis=-1)
+    in_x, in_y, turn = slopes
+    work = x * in_x + y * in_y
+    return offset_mm * load * turn / operations.where(work < 0, work, -math.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +63,15 @@ class VirtualWork:
         slopes = equilibrium.tip_slopes
         if self.fit_range_mm:
             slopes = fitted_slopes(equilibrium.robot.at(equilibrium.length_mm), *self.fit_range_mm)
-        load = np.asarray(equilibrium.tension - equilibrium.onset_tension)
-        return virtual_work(equilibrium.forces, load, slopes, equilibrium.robot.offset_mm, self.friction)
+        load, offset = equilibrium.tension - equilibrium.onset_tension, equilibrium.robot.offset_mm
+        directions = equilibrium.forces @ self.turn
+        x, y = directions.sum(axis=0).tolist()
+        return np.asarray(virtual_work(x, y, load, slopes.tolist(), offset, NUMBERS) * directions)
+
+    @property
+    def turn(self) -> np.ndarray:
+        """Matrix that a row of normal forces is multiplied with, to have friction beside it, ``(2, 2)``."""
+        return np.array([[1.0, self.friction], [-self.friction, 1.0]])
 
     @classmethod
     def calibrated(cls, force: float, load: float, slopes: np.ndarray, offset_mm: float) -> "VirtualWork":

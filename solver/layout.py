@@ -34,7 +34,9 @@ class Layout:
         self.displacements = self._view(obstacles, 2)
         self.forces = self._view(obstacles, 2)
         self.force = self._view(2)
+        self.clearance_at = self.size
         self.clearance = self._view(1)
+        self.onset_at = self.size
         self.onset = self._view(1)
         self.tip_slopes = self._view(3)
         self.flags = self._view(lines * positions)

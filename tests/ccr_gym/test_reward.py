@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ccr_gym.reward import ARRAYS, NUMBERS, TERMS, RewardWeights, reward_terms
+from ccr_gym.reward import TERMS, RewardWeights, reward_terms
+from solver.operations import ARRAYS, NUMBERS
 
 
 def terms(force, desired=0.1, clearance=0.0, action=0.0):
