@@ -259,15 +259,15 @@ def node_problem(
     before, after = disk[:, :-1], disk[:, 1:]
     turned = before[0, :] * after[1, :] - before[1, :] * after[0, :]
     angle = ca.atan2(turned, ca.sum1(before * after))
-    chords, cables = _norms(backbone[:, 1:] - backbone[:, :-1]), _norms(cable[:, 1:] - cable[:, :-1])
+    chords, cables = norms(backbone[:, 1:] - backbone[:, :-1]), norms(cable[:, 1:] - cable[:, :-1])
     if robot.cable == "sliding":
         sinc, _ = sinc_and_cosine(angle**2 / 4)
         astride = ca.sum1((backbone[:, 1:] - backbone[:, :-1]) * (before + after)) / (2 * offset)
-        equalities = ca.horzcat(chords - total / segments * sinc, astride, _norms(after) - offset)
+        equalities = ca.horzcat(chords - total / segments * sinc, astride, norms(after) - offset)
         slack = total - pull - ca.sum2(cables)
     else:
         share = (total - pull) / segments
-        equalities = ca.horzcat(chords - total / segments, cables - share, _norms(after) - offset)
+        equalities = ca.horzcat(chords - total / segments, cables - share, norms(after) - offset)
         slack = ca.MX(0, 1)
     lines = {"backbone": backbone, "cable": cable, "rim": 2 * backbone - cable}
     displacements = ca.reshape(unknowns[4 * segments :], 2, -1)
@@ -295,7 +295,8 @@ def _rotation(angle: ca.MX) -> ca.MX:
     return ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
 
 
-def _norms(columns: ca.MX) -> ca.MX:
+def norms(columns: ca.MX) -> ca.MX:
+    """Lengths of the columns."""
     return ca.sqrt(ca.sum1(columns**2))
 
 
@@ -310,10 +311,8 @@ def _gaps(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
     return gap_function(law).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
 
 
-@lru_cache(maxsize=32)
-def node_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
-    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of :func:`node_problem`."""
-    problem = node_problem(robot, laws, mounted)
+def first_derivatives(problem: NodeProblem) -> ca.Function:
+    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of a problem."""
     outputs = [
         ca.gradient(problem.objective, problem.unknowns),
         problem.equalities,
@@ -321,7 +320,13 @@ def node_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bo
         problem.inequalities,
         ca.jacobian(problem.inequalities, problem.unknowns),
     ]
-    return ca.Function("node_derivatives", [problem.unknowns, problem.parameters], outputs)
+    return ca.Function("first_derivatives", [problem.unknowns, problem.parameters], outputs)
+
+
+@lru_cache(maxsize=32)
+def node_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
+    """:func:`first_derivatives` of :func:`node_problem`."""
+    return first_derivatives(node_problem(robot, laws, mounted))
 
 
 @lru_cache(maxsize=32)

@@ -85,6 +85,8 @@ class ReferenceSolver:
             node the robot does not have.
     """
 
+    _plugin, _options = "ipopt", OPTIONS
+
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self.robot = robot
         self.scene = scene
@@ -150,7 +152,7 @@ class ReferenceSolver:
             "f": problem.objective / unit**2,
             "g": constraints,
         }
-        self._ipopt = ca.nlpsol("reference", "ipopt", nlp, OPTIONS)
+        self._nlp_solver = ca.nlpsol("reference", self._plugin, nlp, self._options)
         multipliers = ca.MX.sym("multipliers", constraints.shape[0])
         lagrangian = problem.objective + ca.dot(multipliers, constraints)
         slope = ca.gradient(lagrangian, problem.parameters)[0]
@@ -213,7 +215,7 @@ class ReferenceSolver:
         scale = self._scale(cable)
         shape = self._shape(cable, length, self._pose(start.unknowns, start.length).coordinates)
         guess = self._balanced(cable, length, np.r_[shape, self._mounts(start)], self._pushes(start))
-        solution = self._ipopt(
+        solution = self._nlp_solver(
             x0=guess.unknowns,
             lam_g0=guess.multipliers / scale,
             p=self._parameters(cable, length),
@@ -223,7 +225,7 @@ class ReferenceSolver:
         unknowns = solution["x"].full().ravel()
         moved = np.linalg.norm((unknowns - start.unknowns).reshape(-1, 2), axis=1).max()
         allowed = MOVE_OFFSET + MOVE_SLOPE * _apart(start, cable, length)
-        stats = self._ipopt.stats()
+        stats = self._nlp_solver.stats()
         if not (stats["success"] and moved <= allowed):
             return None
         multipliers = solution["lam_g"].full().ravel() * scale

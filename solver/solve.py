@@ -9,6 +9,7 @@ from solver._kernel import SHAPE_SIZE, Kernel
 from solver.compile import law_address
 from solver.equilibrium import Equilibrium
 from solver.geometry import touchable_points
+from solver.layout import LENGTH
 from solver.obstacles import SHAPES
 from solver.robot import Robot
 from solver.scene import Scene
@@ -37,7 +38,7 @@ class Solver:
         check_width(robot, scene)
         self._kernel = Kernel(robot.cable == "sliding", kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
-        straight[1] = robot.length_mm
+        straight[LENGTH] = robot.length_mm
         self._rest = self._follow(straight, 0.0, robot.length_mm)
         check_clear(self._rest)
 

@@ -8,18 +8,16 @@ equal share of each cable's displacement.
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from solver.reference import OPTIONS
+from solver.formulation import NodeProblem, first_derivatives, norms
+from solver.reference import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
 from solver.robot import require_positive
 from solver.status import Status
 
-LARGEST_STEP, SMALLEST_STEP = 0.25, 0.03  # cable displacement of one solve, and of the last try of one [mm]
-SLACK = 1e-3  # below it a shear costs too little for IPOPT, and the robot is taken as straight [mm]
-MOVE_OFFSET, MOVE_SLOPE = 0.5, 16.0  # a node that moves farther than offset + slope·|step| has left the branch [mm]
 NARROW = 1e-4  # square of the half sine of an angle below which its series serves
 
 
@@ -99,27 +97,16 @@ class Sphere:
         require_positive("radius", self.radius)
 
 
-class SpatialProblem(NamedTuple):
-    """Eq. 13, symbolic.
+def spatial_problem(robot: SpatialRobot, spheres: int) -> NodeProblem:
+    """Build eq. 13 for a robot and a number of spheres.
 
-    Attributes:
-        unknowns: Backbone points, first and second holes of nodes 1…n, each as x, y, z triples, ``(9n,)`` [mm].
-        parameters: Displacements of both cables, then (x, y, z, r) of each sphere [mm].
-        objective: Sum of squared angles between consecutive disks, towards both holes [rad²].
-        equalities: Zero when lengths of backbone, cables and disks, and the angle between the holes, are as given,
-            ``(6n,)`` [mm].
-        inequalities: Gaps of backbone points, first and second holes of nodes 1…n to each sphere [mm].
+    Returns:
+        ``unknowns``: backbone points, first and second holes of nodes 1…n, each as x, y, z triples, ``(9n,)`` [mm].
+        ``parameters``: displacements of both cables, then (x, y, z, r) of each sphere [mm]. ``objective``: sum of
+        squared angles between consecutive disks, towards both holes [rad²]. ``equalities``: zero when lengths of
+        backbone, cables and disks, and the angle between the holes, are as given, ``(6n,)`` [mm]. ``inequalities``:
+        gaps of backbone points, first and second holes of nodes 1…n to each sphere [mm].
     """
-
-    unknowns: ca.MX
-    parameters: ca.MX
-    objective: ca.MX
-    equalities: ca.MX
-    inequalities: ca.MX
-
-
-def spatial_problem(robot: SpatialRobot, spheres: int) -> SpatialProblem:
-    """Build eq. 13 for a robot and a number of spheres."""
     n, a = robot.segments, robot.offset_mm
     unknowns, parameters = ca.MX.sym("unknowns", 9 * n), ca.MX.sym("parameters", 2 + 4 * spheres)
     bases = np.vstack([np.zeros(3), robot.holes])
@@ -129,17 +116,13 @@ def spatial_problem(robot: SpatialRobot, spheres: int) -> SpatialProblem:
     disks = [line - lines[0] for line in lines[1:]]
     pulls = [ca.MX(0), parameters[0], parameters[1]]
     lengths = [(robot.length_mm - pull) / n for pull in pulls]
-    equalities = [_norms(line[:, 1:] - line[:, :-1]) - length for line, length in zip(lines, lengths, strict=True)]
-    equalities += [_norms(disk[:, 1:]) - a for disk in disks]
+    equalities = [norms(line[:, 1:] - line[:, :-1]) - length for line, length in zip(lines, lengths, strict=True)]
+    equalities += [norms(disk[:, 1:]) - a for disk in disks]
     equalities.append(ca.sum1(disks[0][:, 1:] * disks[1][:, 1:]) / a - a * math.cos(robot.angle))
     gaps = [_sphere_gaps(line[:, 1:], parameters[2 + 4 * j : 6 + 4 * j]) for j in range(spheres) for line in lines]
     first, second = (_square_angles(disk, a) for disk in disks)
     inequalities = ca.horzcat(*gaps).T if gaps else ca.MX(0, 1)
-    return SpatialProblem(unknowns, parameters, ca.sum2(first + second), ca.horzcat(*equalities).T, inequalities)
-
-
-def _norms(columns: ca.MX) -> ca.MX:
-    return ca.sqrt(ca.sum1(columns**2))
+    return NodeProblem(unknowns, parameters, ca.sum2(first + second), ca.horzcat(*equalities).T, inequalities)
 
 
 def _square_angles(disk: ca.MX, offset: float) -> ca.MX:
@@ -322,13 +305,5 @@ def _parameters(spheres: tuple[Sphere, ...], cables: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=32)
 def _derivatives(robot: SpatialRobot, spheres: int) -> ca.Function:
-    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, gaps, theirs``."""
-    problem = spatial_problem(robot, spheres)
-    outputs = [
-        ca.gradient(problem.objective, problem.unknowns),
-        problem.equalities,
-        ca.jacobian(problem.equalities, problem.unknowns),
-        problem.inequalities,
-        ca.jacobian(problem.inequalities, problem.unknowns),
-    ]
-    return ca.Function("spatial_derivatives", [problem.unknowns, problem.parameters], outputs)
+    """:func:`~solver.formulation.first_derivatives` of :func:`spatial_problem`."""
+    return first_derivatives(spatial_problem(robot, spheres))

@@ -15,12 +15,10 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from agents.bench.kernel import PUSHED, timed_step
 from solver import Circle, Equilibrium, ReferenceSolver, Robot, Scene, Solver
-from solver.formulation import node_problem
 
 PULLS = tuple(float(cable) for cable in np.arange(0.25, 8.01, 0.25))  # [mm]
 FIRST_PULL = 1.0  # from which the node problem is compared: it is degenerate at none [mm]
@@ -46,17 +44,7 @@ SQP_OPTIONS: dict[str, Any] = {
 class SqpSolver(ReferenceSolver):
     """The reference solver with CasADi's ``sqpmethod`` and exact Hessians in the place of IPOPT."""
 
-    def _build(self) -> None:
-        super()._build()
-        problem = node_problem(self.robot, self.scene.laws, self.scene.mounted)
-        unit = problem.parameters[0] / (self.robot.segments * problem.parameters[2])
-        nlp: dict[str, Any] = {
-            "x": problem.unknowns,
-            "p": problem.parameters,
-            "f": problem.objective / unit**2,
-            "g": ca.vertcat(problem.equalities, problem.inequalities),
-        }
-        self._ipopt = ca.nlpsol("sqp", "sqpmethod", nlp, SQP_OPTIONS)
+    _plugin, _options = "sqpmethod", SQP_OPTIONS
 
 
 def sqp_times(pulls: tuple[float, ...] = PULLS, obstacle: Circle = PUSHED) -> dict[str, Any]:
@@ -80,7 +68,9 @@ def sqp_times(pulls: tuple[float, ...] = PULLS, obstacle: Circle = PUSHED) -> di
             continue
         apart = (point.unknowns - now.node_solution()[0]).reshape(-1, 2)
         difference, present = max(difference, float(np.hypot(*apart.T).max())), point
-        rows.append((elapsed, 1e3 * rival._ipopt.stats()["t_wall_total"], point.iterations, bool(now.contact.any())))
+        rows.append(
+            (elapsed, 1e3 * rival._nlp_solver.stats()["t_wall_total"], point.iterations, bool(now.contact.any()))
+        )
     names = ("step_ms", "solve_ms", "iterations", "touching")
     columns = {name: [row[i] for row in rows] for i, name in enumerate(names)}
     return {**columns, "failures": failures, "difference_mm": difference}

@@ -91,10 +91,6 @@ class Kernel {
     return shapes;
   }
 
-  bool reaches(double force, double increment, double limit, double length) {
-    return branch_->reaches(force, increment, limit, length);
-  }
-
  private:
   void expect(std::size_t size) const {
     if (size != branch_->block_size()) throw std::invalid_argument("block of the wrong size for this robot and scene");
@@ -115,8 +111,6 @@ class Fleet {
   Fleet(bool sliding, const ccr::Robot& robot, int count, int obstacles, int threads)
       : batch_(sliding, robot, count, obstacles, threads), count_(count), obstacles_(obstacles) {}
 
-  std::size_t block_size() const { return batch_.block_size(); }
-
   void assign(int robot, std::vector<ccr::Obstacle> scene) {
     if (robot < 0 || robot >= count_ || static_cast<int>(scene.size()) != obstacles_)
       throw std::invalid_argument("a robot of the fleet, and as many obstacles as it was made for");
@@ -127,13 +121,13 @@ class Fleet {
             const Counts& iterations) {
     const std::size_t count = count_;
     if (commands.shape(0) != count || commands.shape(1) != 2 || blocks.shape(0) != count ||
-        blocks.shape(1) != block_size() || statuses.shape(0) != count || iterations.shape(0) != count)
+        blocks.shape(1) != batch_.block_size() || statuses.shape(0) != count || iterations.shape(0) != count)
       throw std::invalid_argument("one row of commands, blocks, statuses and iterations for each robot");
     expect(robots);
     double* block = blocks.data();
     const double* command = commands.data();
     std::int64_t *status = statuses.data(), *counted = iterations.data();
-    const std::size_t size = block_size();
+    const std::size_t size = batch_.block_size();
     nb::gil_scoped_release released;
     batch_.each(robots, [&](ccr::Follower& follower, int k) {
       const int i = robots[k];
@@ -198,9 +192,7 @@ NB_MODULE(_kernel, m) {
       .def("step", &Kernel::step, "from_"_a, "cable"_a, "length"_a, "to"_a,
            "Follow the branch from one block to a cable displacement and length into another; (status, iterations).")
       .def("trace", &Kernel::trace, "from_"_a, "cable"_a, "length"_a,
-           "Node poses of every shape accepted on the way, flattened.")
-      .def("reaches", &Kernel::reaches, "force"_a, "increment"_a, "limit"_a, "length"_a,
-           "Whether steady pulls from rest reach a contact force without an event.");
+           "Node poses of every shape accepted on the way, flattened.");
   nb::class_<Fleet>(m, "Fleet", "Many robots alike, each in a scene of its own; their states are the caller's arrays.")
       .def("__init__",
            [](Fleet* self, bool sliding, const ccr::Robot& robot, int count, int obstacles, int threads) {
@@ -208,7 +200,6 @@ NB_MODULE(_kernel, m) {
              new (self) Fleet(sliding, robot, count, obstacles, threads);
            },
            "sliding"_a, "robot"_a, "count"_a, "obstacles"_a, "threads"_a)
-      .def_prop_ro("block_size", &Fleet::block_size, "Length of an equilibrium's block.")
       .def("assign", [](Fleet& self, int robot, const Scene& scene) { self.assign(robot, scene.obstacles); }, "robot"_a,
            "scene"_a, "Put a robot among other obstacles; its block stays as it is.")
       .def("step", &Fleet::step, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a,

@@ -5,22 +5,30 @@
 
 namespace ccr {
 
-// Numbers of all segments, kept number by number so that the laws can write them several segments at a time.
-template <int Laws>
+// Bends of all segments, kept number by number so that the laws can write them several segments at a time: what the laws
+// give, then the chord in the base frame.
+template <class Bend>
 class Table {
  public:
-  explicit Table(int segments)
-      : stride_((segments + kPadding - 1) / kPadding * kPadding), values_((Laws + 2) * stride_) {}
+  static constexpr int kLaws = 10;
 
+  explicit Table(int segments)
+      : stride_((segments + kPadding - 1) / kPadding * kPadding), values_((kLaws + 2) * stride_) {}
+
+  Bend operator[](int i) const {
+    return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
+            at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
+  }
   double* row(int number) { return values_.data() + number * stride_; }
-  double at(int number, int segment) const { return values_[number * stride_ + segment]; }
-  void place(int segment, double dx, double dy) {  // the chord in the base frame
-    row(Laws)[segment] = dx;
-    row(Laws + 1)[segment] = dy;
+  void place(int segment, double dx, double dy) {
+    row(kLaws)[segment] = dx;
+    row(kLaws + 1)[segment] = dy;
   }
 
  private:
   static constexpr int kPadding = 4;  // at least the width of the lanes
+
+  double at(int number, int segment) const { return values_[number * stride_ + segment]; }
 
   int stride_;
   std::vector<double> values_;
@@ -40,13 +48,7 @@ struct UniformCable {
     double dx, dy;                                // backbone segment in the base frame
   };
 
-  struct Bends : Table<10> {
-    using Table::Table;
-    Bend operator[](int i) const {
-      return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
-              at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
-    }
-  };
+  using Bends = Table<Bend>;
 
   // Fills all but dx and dy of n segments; NaN where the law has no value.
   static void bend(int n, const double* sines, double pull, double length, double offset, Bends& bends);
@@ -68,13 +70,7 @@ struct SlidingCable {
     static constexpr double slope = 1, curvature = 0, heading_slope = -0.5, heading_curvature = 0;
   };
 
-  struct Bends : Table<10> {
-    using Table::Table;
-    Bend operator[](int i) const {
-      return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
-              at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
-    }
-  };
+  using Bends = Table<Bend>;
 
   static void bend(int n, const double* angles, double pull, double length, double offset, Bends& bends);
 };
