@@ -26,7 +26,7 @@ instructions: $(INSTALL)  ## count instructions of the kernel (needs valgrind)
 soak: $(INSTALL)
 	$(BIN)/python -m pytest tests/solver/test_soak.py --soak 167000
 
-$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/*) solver/formulation.py solver/codegen.py
+$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/*) solver/formulation.py solver/spatial/formulation.py solver/codegen.py
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	touch $@

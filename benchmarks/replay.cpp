@@ -28,9 +28,9 @@ class Recording {
   std::FILE* file_;
 };
 
-ccr::Obstacle read_circle(Recording& recording, int points) {
+ccr::Obstacle<2> read_circle(Recording& recording, int points) {
   const std::vector<double> circle = recording.numbers(3);
-  ccr::Obstacle obstacle{};
+  ccr::Obstacle<2> obstacle{};
   obstacle.shape = ccr::Shape::kCircle;
   for (int k = 0; k < 3; ++k) obstacle.parameters[k] = circle[k];
   obstacle.center = {{circle[0], circle[1]}};
@@ -44,25 +44,26 @@ ccr::Obstacle read_circle(Recording& recording, int points) {
 
 int main(int, char** arguments) {
   Recording recording(arguments[1]);
-  const bool sliding = recording.count() != 0;
   ccr::Robot robot;
+  robot.sliding = recording.count() != 0;
   robot.segments = recording.count();
   robot.offset = recording.number();
   robot.rigidity = recording.number();
   robot.max_tension = recording.number();
   robot.max_length = recording.number();
-  robot.lines = {0.0, robot.offset};
+  robot.angle = 0;
+  robot.lines = {{{0, 0}}, {{robot.offset, 0}}};
   robot.between = 0;
   int steps = 0;
   for (int scenes = recording.count(); scenes > 0; --scenes) {
-    std::vector<ccr::Obstacle> obstacles;
+    std::vector<ccr::Obstacle<2>> obstacles;
     for (int left = recording.count(); left > 0; --left) obstacles.push_back(read_circle(recording, robot.points()));
-    const auto follower = ccr::make_follower(sliding, robot, static_cast<int>(obstacles.size()));
+    const auto follower = ccr::make_follower<2>(robot, static_cast<int>(obstacles.size()));
     follower->enter(obstacles);
     std::vector<double> to(follower->block_size());
     for (int left = recording.count(); left > 0; --left, ++steps) {
       const std::vector<double> command = recording.numbers(2), from = recording.numbers(to.size());
-      follower->follow(from.data(), {command[0], command[1]}, to.data());
+      follower->follow(from.data(), command.data(), to.data());
     }
   }
   std::printf("%d\n", steps);

@@ -126,7 +126,7 @@ class Fleet:
             normal_x, normal_y = _columns(force_true, which)
             x, y = normal_x - settings.friction * normal_y, normal_y + settings.friction * normal_x
             slopes = _columns(layout.tip_slopes(blocks), which)
-            load = _plain(blocks[..., TENSION] - blocks[..., layout.onset_at], which)
+            load = _plain(blocks[..., TENSION] - layout.onset(blocks)[..., 0], which)
             ratio = virtual_work(x, y, load, slopes, settings.robot.offset_mm, _operations(which))
             force_est[..., 0], force_est[..., 1] = ratio * x, ratio * y
         return Reading(blocks, force_true, force_est, force, _plain(self.desired[which], which))

@@ -1,13 +1,15 @@
 """Many robots alike, each in a scene of its own, moved by one call of the kernel."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from solver import _kernel
-from solver.equilibrium import Equilibrium
-from solver.layout import CABLE, LENGTH, layout
+from solver.equilibrium import BaseEquilibrium, Equilibrium
+from solver.layout import CABLE, PLANE, Layout, Model, layout
 from solver.reference import ReferenceSolver
 from solver.robot import Robot
 from solver.scene import Scene
@@ -15,8 +17,8 @@ from solver.solve import check_width, kernel_robot, kernel_scene
 from solver.status import Status
 
 
-class BatchSolver:
-    """Moves many robots at once; each is moved as :class:`solver.Solver` would, bit for bit.
+class BaseBatch(ABC):
+    """Moves many robots at once; each is moved as its solver would, bit for bit.
 
     Unlike the solver it keeps the present equilibria, as rows of arrays that are written in place.
 
@@ -24,7 +26,7 @@ class BatchSolver:
         blocks: Equilibria, ``(N, size)``; :attr:`layout` tells where their numbers stand.
         statuses: How the last step of each ended, values of :class:`solver.Status`, ``(N,)``.
         iterations: Newton iterations of these steps, ``(N,)``.
-        commands: Cable displacement and length each is moved to, ``(N, 2)`` [mm].
+        commands: Cable displacements and length each is moved to, ``(N, cables + 1)`` [mm].
 
     Args:
         robot: What all robots are.
@@ -36,19 +38,37 @@ class BatchSolver:
         ValueError: If a number is not positive.
     """
 
-    def __init__(self, robot: Robot, count: int, obstacles: int, threads: int = 1) -> None:
+    model: Model
+
+    def __init__(self, robot: Any, count: int, obstacles: int, threads: int = 1) -> None:
         for name, value in (("count", count), ("threads", threads)):
             if not (isinstance(value, int) and value > 0):
                 raise ValueError(f"{name} is {value!r}; it must be a positive whole number")
         self.robot, self.count = robot, count
-        self.layout = layout(robot, obstacles)
+        self.layout = self._make_layout(obstacles)
         self.blocks = np.zeros((count, self.layout.size))
         self.statuses = np.zeros(count, np.int64)
         self.iterations = np.zeros(count, np.int64)
         self._scenes: list[Scene | None] = [None] * count
-        self.commands = np.zeros((count, 2))
-        self._fleet = _kernel.Fleet(robot.cable == "sliding", kernel_robot(robot), count, obstacles, threads)
+        self.commands = np.zeros((count, self.model.cables + 1))
+        self._fleet = self._make_fleet(obstacles, threads)
         self._all = list(range(count))
+
+    @abstractmethod
+    def _make_layout(self, obstacles: int) -> Layout:
+        """The layout of a block."""
+
+    @abstractmethod
+    def _make_fleet(self, obstacles: int, threads: int) -> Any:
+        """The robots in the kernel."""
+
+    @abstractmethod
+    def _kernel_scene(self, scene: Scene) -> Any:
+        """Obstacles as the kernel takes them."""
+
+    @abstractmethod
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, iterations: int) -> BaseEquilibrium:
+        """The result of a solve."""
 
     def assign(self, index: int, scene: Scene) -> None:
         """Put a robot, straight and unactuated, among other obstacles.
@@ -57,37 +77,47 @@ class BatchSolver:
             ValueError: If an obstacle is narrow enough to slip between its points or names a node it does not have.
         """
         check_width(self.robot, scene)
-        self._fleet.assign(index, kernel_scene(self.robot, scene))
+        self._fleet.assign(index, self._kernel_scene(scene))
         self._scenes[index] = scene
 
     def rest(self, robots: Sequence[int]) -> None:
         """Make some robots straight and unactuated again."""
         self.blocks[robots] = 0.0
-        self.blocks[robots, LENGTH] = self.robot.length_mm
-        self.commands[robots] = 0.0, self.robot.length_mm
+        self.blocks[robots, self.layout.length_at] = self.robot.length_mm
+        self.commands[robots] = 0.0
+        self.commands[robots, -1] = self.robot.length_mm
         self._move(list(robots))
 
     def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
         """Move the cables of all robots, or of some, as far as tension and obstacles allow.
 
         Args:
-            cable_mm: Commanded cable displacement of each of them, ``(k,)`` [mm].
+            cable_mm: Commanded cable displacement of each of them, ``(k,)``, in space ``(k, 2)`` [mm].
             robots: Which; ``None`` for all.
 
         Raises:
             ValueError: If a command is out of range; nothing has moved then.
         """
-        if not ((cable_mm >= 0) & (cable_mm <= self.robot.cable_limit_mm)).all():
-            raise ValueError(f"cable_mm is {cable_mm}; all must be from 0 to {self.robot.cable_limit_mm:.6g}")
+        high = self.robot.cable_limit_mm
+        low = 0.0 if self.model.cables == 1 else -high
+        if not ((cable_mm >= low) & (cable_mm <= high)).all():
+            raise ValueError(f"cable_mm is {cable_mm}; all must be from {low:.6g} to {high:.6g}")
         which = self._all if robots is None else list(robots)
-        self.commands[which, CABLE] = cable_mm
+        self.commands[which, :-1] = np.reshape(cable_mm, (-1, self.model.cables))
         self.move(which)
 
     def move(self, which: int | slice | list[int]) -> None:
         """Move one robot, some or all to their commands, which must be in range."""
         self._move([which] if isinstance(which, int) else which if isinstance(which, list) else self._all[which])
 
-    def reaches(self, robots: Sequence[int], forces: np.ndarray, increment_mm: float, limit_mm: float) -> np.ndarray:
+    def reaches(
+        self,
+        robots: Sequence[int],
+        forces: np.ndarray,
+        increment_mm: float,
+        limit_mm: float,
+        directions: np.ndarray | None = None,
+    ) -> np.ndarray:
         """Whether pulling some robots steadily from rest gets each to a contact force, ``(k,)`` bool.
 
         No step may end in anything but ``CONVERGED``, and the straight robot must be clear of the obstacles.
@@ -97,22 +127,41 @@ class BatchSolver:
             forces: Force for each, ``(k,)`` [N].
             increment_mm: Cable displacement of a step [mm].
             limit_mm: Bound on the cable displacement [mm].
+            directions: Displacements of the cables per millimetre of pull, ``(k, cables)``; ``None`` for ones.
         """
+        forces = np.asarray(forces, float)
+        directions = np.ones((len(forces), self.model.cables)) if directions is None else directions
         length = self.robot.length_mm
-        return np.array(
-            self._fleet.reaches(list(robots), np.asarray(forces, float), increment_mm, limit_mm, length), bool
-        )
+        return np.array(self._fleet.reaches(list(robots), forces, directions, increment_mm, limit_mm, length), bool)
 
-    def equilibrium(self, index: int) -> Equilibrium:
+    def equilibrium(self, index: int) -> Any:
         """A robot's present equilibrium, on its own."""
         scene = self._scenes[index]
         if scene is None:
             raise ValueError(f"robot {index} has not been assigned to a scene")
         status, iterations = Status(self.statuses[index]), int(self.iterations[index])
-        return Equilibrium(self.robot, scene, self.blocks[index].copy(), status, iterations)
+        return self._make_equilibrium(scene, self.blocks[index].copy(), status, iterations)
 
     def _move(self, robots: list[int]) -> None:
         self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations)
+
+
+class BatchSolver(BaseBatch):
+    """Many robots in the plane, each moved as :class:`solver.Solver` would; see :class:`BaseBatch`."""
+
+    model = PLANE
+
+    def _make_layout(self, obstacles: int) -> Layout:
+        return layout(self.robot, obstacles)
+
+    def _make_fleet(self, obstacles: int, threads: int) -> _kernel.Fleet:
+        return _kernel.Fleet(kernel_robot(self.robot), self.count, obstacles, threads)
+
+    def _kernel_scene(self, scene: Scene) -> _kernel.Scene:
+        return kernel_scene(self.robot, scene)
+
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, iterations: int) -> Equilibrium:
+        return Equilibrium(self.robot, scene, block, status, iterations)
 
 
 class ReferenceBatch(BatchSolver):

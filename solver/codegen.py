@@ -2,9 +2,16 @@
 
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import casadi as ca
-from formulation import GAP_LAWS, arc_function, gap_function, segment_function
+
+for name, folder in (("solver", "."), ("solver.spatial", "spatial")):  # packages that need the kernel that is being built
+    sys.modules[name] = package = ModuleType(name)
+    package.__path__ = [str(Path(__file__).parent / folder)]
+
+from solver.formulation import GAP_LAWS, arc_function, gap_function, segment_function
+from solver.spatial import formulation as spatial
 
 
 def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
@@ -17,4 +24,5 @@ def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
 
 if __name__ == "__main__":
     generate("segment_laws", [segment_function(), arc_function()], Path(sys.argv[1]))
-    generate("gap_laws", [gap_function(law) for law in GAP_LAWS], Path(sys.argv[1]))
+    generate("spatial_laws", [spatial.closure_function(), spatial.bend_function(), spatial.bow_function()], Path(sys.argv[1]))
+    generate("gap_laws", [gap_function(law) for law in (*GAP_LAWS, *spatial.GAP_LAWS)], Path(sys.argv[1]))

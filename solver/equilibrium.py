@@ -1,20 +1,22 @@
 """The result of a solve: one equilibrium of the robot, immutable and complete."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from solver.formulation import node_derivatives
 from solver.geometry import touching_points
-from solver.layout import CABLE, LENGTH, OBJECTIVE, TENSION, Layout, layout
+from solver.layout import CABLE, TENSION, Layout, layout
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
 
 
 class Residuals(NamedTuple):
-    """Optimality of an equilibrium in the paper's node coordinates (eq. 5), each zero at an exact solution.
+    """Optimality of an equilibrium in the paper's node coordinates (eq. 5 or 13), each zero at an exact solution.
 
     Attributes:
         stationarity: Largest entry of the Lagrangian's gradient, equality multipliers by least squares [rad²/mm].
@@ -32,13 +34,12 @@ class Residuals(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equilibrium:
-    """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
+class BaseEquilibrium(ABC):
+    """What equilibria in the plane and in space have in common.
 
-    Frame: base at the origin, unactuated backbone along +y, cable on the +x side. Obstacles are counted by m, nodes
-    0…n from the base. The points that can touch are counted by line and position, (p, k): the lines of ``robot.touch``,
-    by default (backbone, cable), and along each ``robot.between`` points between every two nodes, by default none, so
-    that a position is a node. All arrays are read-only.
+    Obstacles are counted by m, nodes 0…n from the base. The points that can touch are counted by line and position,
+    (p, k): along each line of the robot, ``robot.between`` points between every two nodes, by default none, so that a
+    position is a node. Places and forces have d numbers, 2 or 3. All arrays are read-only.
 
     Attributes:
         robot: The robot.
@@ -49,7 +50,7 @@ class Equilibrium:
         iterations: Newton iterations of that step.
     """
 
-    robot: Robot
+    robot: Any
     scene: Scene
     block: np.ndarray
     status: Status
@@ -59,24 +60,14 @@ class Equilibrium:
         self.block.flags.writeable = False
 
     @property
-    def cable_mm(self) -> float:
-        """Cable displacement l, which differs from the command after a stall or jam [mm]."""
-        return float(self.block[CABLE])
-
-    @property
     def length_mm(self) -> float:
         """Length of the backbone L0, which insertion changes [mm]."""
-        return float(self.block[LENGTH])
-
-    @property
-    def tension(self) -> float:
-        """Cable tension dE/dl along the branch [N]."""
-        return float(self.block[TENSION])
+        return float(self.block[self._layout.length_at])
 
     @property
     def objective(self) -> float:
-        """Sum of squared disk angles J = Σθ² [rad²]."""
-        return float(self.block[OBJECTIVE])
+        """Sum of squared disk angles J [rad²]."""
+        return float(self.block[self._layout.objective_at])
 
     @property
     def energy(self) -> float:
@@ -88,7 +79,122 @@ class Equilibrium:
     @property
     def stiffness(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective J into energy."""
-        return self.robot.rigidity * self.robot.segments / (2 * self.length_mm)
+        return float(self.robot.rigidity * self.robot.segments / (2 * self.length_mm))
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Lagrange multipliers of the gaps, ``(m, p, k)`` [rad²/mm]."""
+        return self._layout.multipliers(self.block)
+
+    @property
+    def gaps(self) -> np.ndarray:
+        """Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, p, k)`` [mm]."""
+        return self._layout.gaps(self.block)
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """How far each obstacle has been pushed from its place, zero for a fixed one, ``(m, d)`` [mm]."""
+        return self._layout.displacements(self.block)
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Force of each obstacle on the robot, by energy, ``(m, d)`` [N]."""
+        return self._layout.forces(self.block)
+
+    @property
+    def scene_now(self) -> Scene:
+        """The obstacles where they have been pushed to."""
+        moved = zip(self.scene, self.displacements, strict=True)
+        return Scene(obstacle.shifted(shift) for obstacle, shift in moved) if any(self.scene.mounted) else self.scene
+
+    @property
+    def contact(self) -> np.ndarray:
+        """Which points touch which obstacle: a positive multiplier, ``(m, p, k)`` bool."""
+        return self.multipliers > 0
+
+    @property
+    def pushes(self) -> np.ndarray:
+        """Multipliers of the inequalities of the node-coordinate problem, ``(k,)`` [rad²/mm]."""
+        return self.multipliers[:, :, 1:].ravel()
+
+    @property
+    @abstractmethod
+    def points(self) -> np.ndarray:
+        """The points that can touch, ``(p, k, d)`` [mm]."""
+
+    @property
+    @abstractmethod
+    def _layout(self) -> Layout:
+        """Where the numbers stand in the block."""
+
+    @property
+    @abstractmethod
+    def _derivatives(self) -> ca.Function:
+        """:func:`~solver.formulation.first_derivatives` of the node-coordinate problem."""
+
+    @abstractmethod
+    def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
+        """Unknowns and parameters of the node-coordinate problem."""
+
+    def node_solution(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Unknowns, parameters and multipliers of the node-coordinate problem at this equilibrium.
+
+        The multipliers are those of the equalities, by least squares, and of the inequalities.
+        """
+        unknowns, parameters = self._node_point()
+        balance, equality_slopes = self._balance(self._node_derivatives(unknowns, parameters))
+        return unknowns, parameters, _tensions(balance, equality_slopes), self.pushes
+
+    def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
+        return [value.full() for value in self._derivatives(unknowns, parameters)]
+
+    def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Slope of the objective less the contact forces, and the slopes of the equalities that balance it."""
+        slope, _, equality_slopes, _, gap_slopes = derivatives
+        pushes = self.pushes
+        return slope.ravel() - (gap_slopes.T @ pushes if pushes.size else 0.0), equality_slopes
+
+    def residuals(self) -> Residuals:
+        """Recompute the optimality conditions of eq. 5 or 13 from the nodes and multipliers alone.
+
+        The derivatives are those of the node-coordinate problem, which shares nothing with the reduced coordinates that
+        the solver works in.
+        """
+        derivatives = self._node_derivatives(*self._node_point())
+        _, lengths, _, gaps, _ = derivatives
+        balance, equality_slopes = self._balance(derivatives)
+        tensions, pushes = _tensions(balance, equality_slopes), self.pushes
+        touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
+        touchable = np.concatenate([np.ones(pushes.size - touchable.size, bool), touchable])
+        clearance = gaps.ravel()[touchable]
+        return Residuals(
+            stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
+            lengths=float(np.abs(lengths).max()),
+            gaps=float(max(0.0, -clearance.min(initial=0.0))),
+            complementarity=float(np.abs(pushes[touchable] * clearance).max(initial=0.0)),
+            sign=float(max(0.0, -pushes.min(initial=0.0))),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equilibrium(BaseEquilibrium):
+    """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
+
+    Frame: base at the origin, unactuated backbone along +y, cable on the +x side. The lines of points that can touch are
+    those of ``robot.touch``, by default (backbone, cable). The attributes are those of :class:`BaseEquilibrium`.
+    """
+
+    robot: Robot
+
+    @property
+    def cable_mm(self) -> float:
+        """Cable displacement l, which differs from the command after a stall or jam [mm]."""
+        return float(self.block[CABLE])
+
+    @property
+    def tension(self) -> float:
+        """Cable tension dE/dl along the branch [N]."""
+        return float(self.block[TENSION])
 
     @property
     def shear(self) -> np.ndarray:
@@ -104,7 +210,7 @@ class Equilibrium:
     @property
     def cable_nodes(self) -> np.ndarray:
         """Cable point on each disk, ``(n+1, 2)`` [mm]."""
-        return self._layout.cable_nodes(self.block)
+        return np.asarray(self.nodes[:, :2] + self.robot.offset_mm * self._layout.frames(self.block))
 
     @property
     def slack_mm(self) -> float:
@@ -117,24 +223,10 @@ class Equilibrium:
         return touching_points(self.robot, self.nodes)
 
     @property
-    def multipliers(self) -> np.ndarray:
-        """Lagrange multipliers of the gaps, ``(m, p, k)`` [rad²/mm]."""
-        return self._layout.multipliers(self.block)
-
-    @property
-    def gaps(self) -> np.ndarray:
-        """Signed clearance of each point from each obstacle, infinite where they cannot touch, ``(m, p, k)`` [mm]."""
-        return self._layout.gaps(self.block)
-
-    @property
-    def displacements(self) -> np.ndarray:
-        """How far each obstacle has been pushed from its place, zero for a fixed one, ``(m, 2)`` [mm]."""
-        return self._layout.displacements(self.block)
-
-    @property
-    def forces(self) -> np.ndarray:
-        """Force of each obstacle on the robot, by energy, ``(m, 2)`` [N]."""
-        return self._layout.forces(self.block)
+    def pushes(self) -> np.ndarray:
+        """Multipliers of the inequalities of :func:`solver.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
+        multipliers = self.multipliers[:, :, 1:].ravel()
+        return np.r_[self.tension / self.stiffness, multipliers] if self.robot.cable == "sliding" else multipliers
 
     @property
     def onset_tension(self) -> float:
@@ -151,67 +243,14 @@ class Equilibrium:
         return layout(self.robot, len(self.scene))
 
     @property
-    def scene_now(self) -> Scene:
-        """The obstacles where they have been pushed to."""
-        moved = zip(self.scene, self.displacements, strict=True)
-        return Scene(obstacle.shifted(shift) for obstacle, shift in moved) if any(self.scene.mounted) else self.scene
-
-    @property
-    def contact(self) -> np.ndarray:
-        """Which points touch which obstacle: a positive multiplier, ``(m, p, k)`` bool."""
-        return self.multipliers > 0
-
-    def node_solution(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Unknowns, parameters and multipliers of :func:`solver.formulation.node_problem` at this equilibrium.
-
-        The multipliers are those of the equalities, by least squares, and of the inequalities.
-        """
-        unknowns, parameters = self._node_point()
-        balance, equality_slopes = self._balance(self._node_derivatives(unknowns, parameters))
-        return unknowns, parameters, _tensions(balance, equality_slopes), self.pushes
-
-    @property
-    def pushes(self) -> np.ndarray:
-        """Multipliers of the inequalities of :func:`solver.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
-        multipliers = self.multipliers[:, :, 1:].ravel()
-        return np.r_[self.tension / self.stiffness, multipliers] if self.robot.cable == "sliding" else multipliers
+    def _derivatives(self) -> ca.Function:
+        return node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
 
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
         robot, mounts = self.robot, self.displacements[list(self.scene.mounted)]
         parameters = [self.cable_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
         unknowns = [self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel(), mounts.ravel()]
         return np.concatenate(unknowns), np.array(parameters)
-
-    def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
-        derivatives = node_derivatives(self.robot, self.scene.laws, self.scene.mounted)(unknowns, parameters)
-        return [value.full() for value in derivatives]
-
-    def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Slope of the objective less the contact forces, and the slopes of the equalities that balance it."""
-        slope, _, equality_slopes, _, gap_slopes = derivatives
-        pushes = self.pushes
-        return slope.ravel() - (gap_slopes.T @ pushes if pushes.size else 0.0), equality_slopes
-
-    def residuals(self) -> Residuals:
-        """Recompute the optimality conditions of eq. 5 from the nodes and multipliers alone.
-
-        The derivatives are those of the node-coordinate problem in :mod:`solver.formulation`, which shares nothing
-        with the reduced coordinates that the solver works in.
-        """
-        derivatives = self._node_derivatives(*self._node_point())
-        _, lengths, _, gaps, _ = derivatives
-        balance, equality_slopes = self._balance(derivatives)
-        tensions, pushes = _tensions(balance, equality_slopes), self.pushes
-        touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
-        touchable = np.concatenate([np.ones(pushes.size - touchable.size, bool), touchable])
-        clearance = gaps.ravel()[touchable]
-        return Residuals(
-            stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
-            lengths=float(np.abs(lengths).max()),
-            gaps=float(max(0.0, -clearance.min(initial=0.0))),
-            complementarity=float(np.abs(pushes[touchable] * clearance).max(initial=0.0)),
-            sign=float(max(0.0, -pushes.min(initial=0.0))),
-        )
 
 
 def _tensions(balance: np.ndarray, equality_slopes: np.ndarray) -> np.ndarray:

@@ -40,13 +40,13 @@ def segment_closure(half_sine: ca.SX, sine: ca.SX, pull: ca.SX, length: ca.SX, o
 
 
 def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a circle ``shape = (x, y, r)``: ``(|p − c|² − r²) / 2r``."""
-    return (ca.sumsqr(point - shape[:2]) - shape[2] ** 2) / (2 * shape[2])
+    """Gap to a circle or a sphere ``shape = (center, r)``: ``(|p − c|² − r²) / 2r``."""
+    return (ca.sumsqr(point - shape[:-1]) - shape[-1] ** 2) / (2 * shape[-1])
 
 
 def half_plane_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a half-plane ``shape = (nx, ny, offset)`` with unit outward normal: ``n·p − offset`` (eq. 12)."""
-    return ca.dot(point, shape[:2]) - shape[2]
+    """Gap to a half-plane or a half-space ``shape = (n, offset)``, unit outward normal n: ``n·p − offset`` (eq. 12)."""
+    return ca.dot(point, shape[:-1]) - shape[-1]
 
 
 def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -62,11 +62,11 @@ def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
 
 
 def capsule_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a capsule ``shape = (x1, y1, x2, y2, r)``: that of the circle about the nearest point of its axis."""
-    axis = shape[2:4] - shape[:2]
-    fraction = ca.dot(point - shape[:2], axis) / ca.sumsqr(axis)
-    nearest = shape[:2] + ca.fmin(ca.fmax(fraction, 0), 1) * axis
-    return circle_gap(point, ca.vertcat(nearest, shape[4]))
+    """Gap to a capsule ``shape = (start, end, r)``: that of the circle or sphere about the nearest point of its axis."""
+    start, axis = shape[: point.numel()], shape[point.numel() : -1] - shape[: point.numel()]
+    fraction = ca.dot(point - start, axis) / ca.sumsqr(axis)
+    nearest = start + ca.fmin(ca.fmax(fraction, 0), 1) * axis
+    return circle_gap(point, ca.vertcat(nearest, shape[-1]))
 
 
 def polygon_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -106,12 +106,14 @@ class GapLaw(NamedTuple):
         gap: The gap as a function of (point, shape), with unit slope on the surface.
         size: How many numbers its shape has.
         growth: Those of them that grow as much as the obstacle grows outwards.
+        space: Dimension of the points.
     """
 
     kind: str
     gap: Callable[[ca.SX, ca.SX], ca.SX]
     size: int
     growth: tuple[int, ...]
+    space: int = 2
 
 
 TINY = 1e-200  # keeps quotients defined where an edge has no length [mm²]
@@ -200,11 +202,12 @@ def arc_function() -> ca.Function:
 
 @lru_cache(maxsize=64)
 def gap_function(law: GapLaw) -> ca.Function:
-    """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle."""
-    point, shape = ca.SX.sym("point", 2), ca.SX.sym("shape", law.size)
+    """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle, and likewise in space."""
+    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
     gap = law.gap(point, shape)
     hessian, gradient = ca.hessian(gap, point)
-    outputs = ca.vertcat(gap, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1])
+    upper = [hessian[row, column] for row in range(law.space) for column in range(row, law.space)]
+    outputs = ca.vertcat(gap, gradient, *upper)
     return ca.Function(f"ccr_{law.kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
 
 
@@ -285,8 +288,8 @@ def node_problem(
             energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * stiffness)
             shift = shift + moved
         for line in robot.touch:
-            points = _divided(lines[line], robot.between)[:, 1:]
-            gaps.append(_gaps(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
+            points = divided(lines[line], robot.between)[:, 1:]
+            gaps.append(gaps_of(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
     return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(slack, *gaps))
 
 
@@ -300,13 +303,14 @@ def norms(columns: ca.MX) -> ca.MX:
     return ca.sqrt(ca.sum1(columns**2))
 
 
-def _divided(line: ca.MX, between: int) -> ca.MX:
+def divided(line: ca.MX, between: int) -> ca.MX:
     """The points of a line with as many between every two."""
     pieces = [line[:, :-1] + k / (between + 1) * (line[:, 1:] - line[:, :-1]) for k in range(between + 1)]
-    return ca.horzcat(ca.reshape(ca.vertcat(*pieces), 2, -1), line[:, -1])
+    return ca.horzcat(ca.reshape(ca.vertcat(*pieces), line.shape[0], -1), line[:, -1])
 
 
-def _gaps(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
+def gaps_of(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
+    """Gaps of the columns to an obstacle."""
     count = points.shape[1]
     return gap_function(law).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
 

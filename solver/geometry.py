@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver.robot import Robot
+from solver.robot import AnyRobot, Robot
 from solver.scene import Scene
 
 
@@ -12,20 +12,25 @@ def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:
     Those between two nodes divide the straight line between their points evenly.
     """
     disks = np.column_stack([np.cos(nodes[:, 2]), np.sin(nodes[:, 2])])
-    lines = nodes[:, :2] + np.array(robot.lines_mm)[:, None, None] * disks
-    place = np.arange(robot.positions) / (robot.between + 1)
-    node = np.minimum(place.astype(int), robot.segments - 1)
+    return divided(nodes[:, :2] + np.array(robot.lines_mm)[:, None, None] * disks, robot.between)
+
+
+def divided(lines: np.ndarray, between: int) -> np.ndarray:
+    """Lines ``(p, n+1, d)`` with as many points between every two, which divide the straight line evenly."""
+    segments = lines.shape[1] - 1
+    place = np.arange(segments * (between + 1) + 1) / (between + 1)
+    node = np.minimum(place.astype(int), segments - 1)
     fraction = (place - node)[:, None]
     return np.asarray((1 - fraction) * lines[:, node] + fraction * lines[:, node + 1])
 
 
-def touchable_points(robot: Robot, scene: Scene) -> np.ndarray:
+def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
     """Which of these points can touch each obstacle, ``(m, lines, positions)`` bool: all, or those of its nodes.
 
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
     """
-    touchable = np.ones((len(scene), len(robot.touch), robot.positions), bool)
+    touchable = np.ones((len(scene), len(robot.lines_mm), robot.positions), bool)
     for points, obstacle in zip(touchable, scene, strict=True):
         if obstacle.nodes is not None:
             points[:] = False

@@ -1,4 +1,4 @@
-"""Obstacles of the plane, validated once."""
+"""Obstacles of the plane, and what those of space share with them, validated once."""
 
 import math
 from abc import ABC, abstractmethod
@@ -9,28 +9,27 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from solver import _kernel
-from solver.formulation import CAPSULE, CIRCLE, ELLIPSE, GAP_LAWS, HALF_PLANE, POLYGON, POLYGON_CORNERS, GapLaw
+from solver.formulation import CAPSULE, CIRCLE, ELLIPSE, HALF_PLANE, POLYGON, POLYGON_CORNERS, GapLaw
 from solver.robot import require_positive
 
 Pair = tuple[float, float]
-Matrix = tuple[Pair, Pair]
+Place = tuple[float, ...]
+Matrix = tuple[Place, ...]
 
-SHAPES = {
-    kind: index for index, kind in enumerate([*(law.kind for law in GAP_LAWS), "custom"])
-}  # as ccr::Shape in native/obstacle.hpp
+SHAPES = {kind: index for index, kind in enumerate(_kernel.SHAPES)}
 
 
 class Extent(NamedTuple):
     """How large an obstacle is.
 
     Attributes:
-        center: Centre (x, y) of a disc that holds it [mm].
-        radius: Radius of that disc [mm]; infinite for a half-plane.
-        width: Smallest distance between parallel lines that hold it [mm]; infinite for a half-plane.
-        fineness: Smallest radius of curvature of the surface [mm]; infinite for a half-plane.
+        center: Centre of a disc or ball that holds it [mm].
+        radius: Radius of that disc [mm]; infinite for a wall.
+        width: Smallest distance between parallel lines or planes that hold it [mm]; infinite for a wall.
+        fineness: Smallest radius of curvature of the surface [mm]; infinite for a wall.
     """
 
-    center: Pair
+    center: Place
     radius: float
     width: float
     fineness: float
@@ -43,18 +42,20 @@ class Obstacle(ABC):
     Attributes:
         nodes: Node indices (base = 0) that can touch it; ``None`` for all.
         stiffness: Of the spring it is mounted on, which lets it shift but not turn [N/mm]: one number, or a symmetric
-            matrix ``((kxx, kxy), (kxy, kyy))``, kept as that. ``None`` for a fixed obstacle.
+            matrix, in the plane ``((kxx, kxy), (kxy, kyy))``, kept as that. ``None`` for a fixed obstacle.
 
     Raises:
         ValueError: If a node index is negative or repeated, or the stiffness is not positive definite.
     """
+
+    space: ClassVar[int] = 2  # dimension of its points
 
     nodes: tuple[int, ...] | None = None
     stiffness: float | Matrix | None = None
 
     def __post_init__(self) -> None:
         if self.stiffness is not None:
-            object.__setattr__(self, "stiffness", _stiffness(self.stiffness))
+            object.__setattr__(self, "stiffness", _stiffness(self.stiffness, self.space))
         if self.nodes is not None:
             nodes = tuple(int(node) for node in self.nodes)
             if not nodes or min(nodes) < 0 or len(set(nodes)) != len(nodes):
@@ -73,8 +74,8 @@ class Obstacle(ABC):
 
     @property
     def stiffness_matrix(self) -> np.ndarray:
-        """``stiffness`` as an array ``(2, 2)`` [N/mm], zero for a fixed obstacle."""
-        return np.zeros((2, 2)) if self.stiffness is None else np.array(self.stiffness)
+        """``stiffness`` as an array ``(2, 2)``, in space ``(3, 3)`` [N/mm], zero for a fixed obstacle."""
+        return np.zeros((self.space, self.space)) if self.stiffness is None else np.array(self.stiffness)
 
     @property
     @abstractmethod
@@ -88,11 +89,14 @@ class Obstacle(ABC):
 
     @abstractmethod
     def outline(self) -> np.ndarray:
-        """Points of its surface in order, ``(k, 2)`` [mm]: a closed polygon, or the surface point of a half-plane."""
+        """Points of its surface [mm].
+
+        In the plane a closed polygon, ``(k, 2)``, or the surface point of a half-plane; in space a grid, ``(u, v, 3)``.
+        """
 
     @abstractmethod
     def shifted(self, by: Iterable[float]) -> Self:
-        """The same obstacle elsewhere, by a shift (x, y) [mm]."""
+        """The same obstacle elsewhere, by a shift [mm]."""
 
     def touchable(self, nodes: int) -> np.ndarray:
         """Which of the nodes 0…n can touch it, ``(nodes,)`` bool.
@@ -109,17 +113,18 @@ class Obstacle(ABC):
         return np.asarray(np.isin(np.arange(nodes), self.nodes))
 
     def gap(self, points: np.ndarray) -> np.ndarray:
-        """Gaps of points ``(..., 2)`` [mm]; positive outside."""
+        """Gaps of points ``(..., 2)``, in space ``(..., 3)`` [mm]; positive outside."""
         return self._law(points)[..., 0]
 
     def normal_at(self, point: np.ndarray) -> np.ndarray:
-        """Gradient of the gap at points ``(..., 2)``, the outward unit normal on the surface, ``(..., 2)``."""
+        """Gradient of the gap at points, the outward unit normal on the surface, shaped as they are."""
         return self._law(point)[..., 1:]
 
     def _law(self, points: np.ndarray) -> np.ndarray:
         points = np.ascontiguousarray(points, dtype=float)
-        gaps = np.empty((*points.shape[:-1], 3))
-        _kernel.measure_gaps(SHAPES[self.kind], np.array(self.parameters), points, gaps)
+        gaps = np.empty((*points.shape[:-1], self.space + 1))
+        measure = _kernel.measure_gaps if self.space == 2 else _kernel.measure_spatial_gaps
+        measure(SHAPES[self.kind], np.array(self.parameters), points, gaps)
         return gaps
 
 
@@ -353,51 +358,74 @@ class Polygon(Obstacle):
         return _rounded(np.array(self.corners), self.radius)
 
 
+def place(name: str, value: Iterable[float], space: int = 2) -> Place:
+    """As many finite numbers as the space has dimensions.
+
+    Raises:
+        ValueError: Naming what they are.
+    """
+    wanted = "a pair (x, y)" if space == 2 else "three coordinates (x, y, z)"
+    try:
+        numbers = tuple(float(v) for v in value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} is {value!r}; it must be {wanted} of numbers") from error
+    if len(numbers) != space:
+        raise ValueError(f"{name} is {value!r}; it must be {wanted} of numbers")
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name} is {value}; it must be finite")
+    return numbers
+
+
 def pair(name: str, value: Iterable[float]) -> Pair:
     """Two finite numbers.
 
     Raises:
         ValueError: Naming what they are.
     """
-    try:
-        x, y = (float(v) for v in value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} is {value!r}; it must be a pair (x, y) of numbers") from error
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise ValueError(f"{name} is {value}; it must be finite")
+    x, y = place(name, value)
     return x, y
 
 
 def plus(point: Pair, by: Iterable[float]) -> Pair:
-    """A point moved by a shift."""
+    """A point of the plane moved by a shift."""
     x, y = by
     return point[0] + float(x), point[1] + float(y)
 
 
-def _stiffness(value: float | Matrix) -> Matrix:
+def _stiffness(value: float | Matrix, space: int) -> Matrix:
     try:
         matrix = np.array(value, dtype=float)
-        matrix = np.diag([matrix, matrix]) if matrix.ndim == 0 else matrix.reshape(2, 2)
+        matrix = np.diag([matrix] * space) if matrix.ndim == 0 else matrix.reshape(space, space)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"stiffness is {value!r}; it must be a number or a matrix ((kxx, kxy), (kxy, kyy))") from error
-    definite = matrix[0, 0] > 0 and matrix[0, 0] * matrix[1, 1] > matrix[0, 1] * matrix[1, 0]
-    if not (np.isfinite(matrix).all() and matrix[0, 1] == matrix[1, 0] and definite):
+        form = "((kxx, kxy), (kxy, kyy))" if space == 2 else "of three rows"
+        raise ValueError(f"stiffness is {value!r}; it must be a number or a matrix {form}") from error
+    sound = np.isfinite(matrix).all() and (matrix == matrix.T).all()
+    if not (sound and np.linalg.eigvalsh(matrix)[0] > 0):
         raise ValueError(f"stiffness is {value}; it must be finite, symmetric and positive definite")
-    (xx, xy), (_, yy) = matrix.tolist()
-    return (xx, xy), (xy, yy)
+    return tuple(map(tuple, matrix.tolist()))
 
 
 def unit(name: str, value: Iterable[float], meaning: str) -> Pair:
-    """A direction, normalised.
+    """A direction of the plane, normalised.
 
     Raises:
         ValueError: If it has none, naming what it is for.
     """
-    x, y = pair(name, value)
-    size = math.hypot(x, y)
+    x, y = direction(name, value, meaning)
+    return x, y
+
+
+def direction(name: str, value: Iterable[float], meaning: str, space: int = 2) -> Place:
+    """A direction of the plane or of space, normalised.
+
+    Raises:
+        ValueError: If it has none, naming what it is for.
+    """
+    numbers = place(name, value, space)
+    size = math.hypot(*numbers)
     if size == 0:
-        raise ValueError(f"{name} is (0, 0); give the direction {meaning}")
-    return x / size, y / size
+        raise ValueError(f"{name} is {numbers}; give the direction {meaning}")
+    return tuple(number / size for number in numbers)
 
 
 def _turns(corners: tuple[Pair, ...]) -> list[float]:

@@ -290,7 +290,7 @@ class ReferenceSolver:
             [point.cable, point.length, self._tension(point), np.sum(pose.turns**2)],
             pose.coordinates,
             nodes,
-            pose.cable,
+            (pose.cable - pose.backbone) / self.robot.offset_mm,
             multipliers,
             self._gaps(nodes, displacements),
             displacements,

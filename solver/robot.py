@@ -1,7 +1,9 @@
 """The robot: what the solver needs to know of it, validated once."""
 
 import math
+from collections.abc import Sized
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 LINES = ("backbone", "cable", "rim")
 CABLES = ("uniform", "sliding")
@@ -144,6 +146,25 @@ class Robot:
         """``max_cable_mm`` with its default filled in [mm]."""
         assert self.max_cable_mm is not None
         return self.max_cable_mm
+
+
+class AnyRobot(Protocol):
+    """What robots in the plane and in space have in common."""
+
+    segments: int
+    between: int
+
+    @property
+    def lines_mm(self) -> Sized:
+        """Places on the disk of the lines of points that can touch [mm]."""
+
+    @property
+    def positions(self) -> int:
+        """Number of points of a line that can touch, node 0 included."""
+
+    @property
+    def spacing_mm(self) -> float:
+        """Largest distance between neighbouring points of the backbone that can touch [mm]."""
 
 
 def require_positive(name: str, value: float | None) -> None:

@@ -20,7 +20,7 @@ class Scene:
 
     Raises:
         TypeError: If an entry is not an obstacle.
-        ValueError: If there are more than 32.
+        ValueError: If there are more than 32, or some in the plane and some in space.
     """
 
     obstacles: tuple[Obstacle, ...]
@@ -32,8 +32,11 @@ class Scene:
         for obstacle in self.obstacles:
             if not isinstance(obstacle, Obstacle):
                 raise TypeError(
-                    f"{obstacle!r} is not an obstacle; give a Circle, HalfPlane, Ellipse, Capsule, Polygon or Custom"
+                    f"{obstacle!r} is not an obstacle; give a Circle, HalfPlane, Ellipse, Capsule, Polygon or Custom, "
+                    "or in space one of solver.spatial"
                 )
+        if len({obstacle.space for obstacle in self.obstacles}) > 1:
+            raise ValueError("obstacles has some of the plane and some of space; a scene holds one kind")
 
     def __len__(self) -> int:
         return len(self.obstacles)
@@ -48,9 +51,9 @@ class Scene:
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """The shapes, one after the other, then (kxx, kxy, kyy) of every obstacle on a spring [N/mm]."""
+        """The shapes, one after the other, then (kxx, kxy, kyy) of every obstacle on a spring [N/mm]; in space six."""
         shapes = [value for obstacle in self.obstacles for value in obstacle.parameters]
-        springs = [obstacle.stiffness_matrix[np.triu_indices(2)] for obstacle in self.obstacles if obstacle.stiffness]
+        springs = [o.stiffness_matrix[np.triu_indices(o.space)] for o in self.obstacles if o.stiffness]
         return (*shapes, *np.ravel(springs).tolist())
 
     @property

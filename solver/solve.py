@@ -5,13 +5,13 @@ import math
 import numpy as np
 
 from solver import _kernel
-from solver._kernel import SHAPE_SIZE, Kernel
+from solver._kernel import SHAPE_SIZE
 from solver.compile import law_address
-from solver.equilibrium import Equilibrium
+from solver.equilibrium import BaseEquilibrium, Equilibrium
 from solver.geometry import touchable_points
 from solver.layout import LENGTH
 from solver.obstacles import SHAPES
-from solver.robot import Robot
+from solver.robot import AnyRobot, Robot
 from solver.scene import Scene
 from solver.status import Status
 
@@ -36,7 +36,7 @@ class Solver:
         self.robot = robot
         self.scene = scene
         check_width(robot, scene)
-        self._kernel = Kernel(robot.cable == "sliding", kernel_robot(robot), kernel_scene(robot, scene))
+        self._kernel = _kernel.Kernel(kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
         straight[LENGTH] = robot.length_mm
         self._rest = self._follow(straight, 0.0, robot.length_mm)
@@ -75,20 +75,27 @@ class Solver:
             ValueError: As :meth:`step`.
         """
         length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
-        shapes = self._kernel.trace(equilibrium.block, cable_mm, length_mm)
+        shapes = self._kernel.trace(equilibrium.block, (cable_mm, length_mm))
         return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
 
     def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
-        status, iterations = self._kernel.step(block, cable_mm, length_mm, reached)
+        status, iterations = self._kernel.step(block, (cable_mm, length_mm), reached)
         return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
 
 
 def kernel_robot(robot: Robot) -> _kernel.Robot:
     """A robot as the kernel takes it."""
-    lines, longest = list(robot.lines_mm), robot.lengths_mm[1]
     return _kernel.Robot(
-        robot.segments, robot.offset_mm, robot.rigidity, robot.max_tension, longest, lines, robot.between
+        sliding=robot.cable == "sliding",
+        segments=robot.segments,
+        offset=robot.offset_mm,
+        angle=0.0,
+        rigidity=robot.rigidity,
+        max_tension=robot.max_tension,
+        max_length=robot.lengths_mm[1],
+        lines=[(line, 0.0) for line in robot.lines_mm],
+        between=robot.between,
     )
 
 
@@ -99,18 +106,31 @@ def kernel_scene(robot: Robot, scene: Scene) -> _kernel.Scene:
         ValueError: If an obstacle names a node that the robot does not have.
         RuntimeError: If a custom shape cannot be compiled.
     """
+    return _kernel.Scene(*scene_arrays(robot, scene))
+
+
+SceneArrays = tuple[list[int], np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[int]]
+
+
+def scene_arrays(robot: AnyRobot, scene: Scene) -> SceneArrays:
+    """What the kernel wants to know of obstacles.
+
+    Raises:
+        ValueError: If an obstacle names a node that the robot does not have.
+        RuntimeError: If a custom shape cannot be compiled.
+    """
     extents = [obstacle.extent for obstacle in scene]
-    return _kernel.Scene(
+    return (
         [SHAPES[obstacle.kind] for obstacle in scene],
         np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
         np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
-        touchable_points(robot, scene).reshape(len(scene), len(robot.touch) * robot.positions),
+        touchable_points(robot, scene).reshape(len(scene), len(robot.lines_mm) * robot.positions),
         np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
         [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
     )
 
 
-def check_width(robot: Robot, scene: Scene) -> None:
+def check_width(robot: AnyRobot, scene: Scene) -> None:
     """Refuse obstacles narrow enough to slip between two points of the robot that can touch.
 
     Raises:
@@ -121,11 +141,11 @@ def check_width(robot: Robot, scene: Scene) -> None:
         if obstacle.nodes is None and width < robot.spacing_mm:
             raise ValueError(
                 f"{obstacle!r} is {width:.3g} mm wide and could slip between points {robot.spacing_mm:.3g} mm apart; "
-                f"give the robot between={math.ceil(robot.lengths_mm[1] / robot.segments / width) - 1} or more"
+                f"give the robot between={math.ceil(robot.spacing_mm * (robot.between + 1) / width) - 1} or more"
             )
 
 
-def check_clear(rest: Equilibrium) -> None:
+def check_clear(rest: BaseEquilibrium) -> None:
     """Refuse obstacles that overlap the straight robot.
 
     Raises:
@@ -149,14 +169,23 @@ def check_command(
         raise ValueError(
             f"cable_mm is {cable_mm}; it must be from 0 to {robot.cable_limit_mm:.6g} (robot.max_cable_mm)"
         )
-    if equilibrium.robot is not robot and equilibrium.robot != robot:
-        raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
-    if equilibrium.scene is not scene and equilibrium.scene != scene:
-        raise ValueError("the equilibrium is of another scene; step from rest() of this solver")
+    check_origin(robot, scene, equilibrium)
     if length_mm is None:
         return equilibrium.length_mm
     robot.check_length(length_mm)
     return length_mm
+
+
+def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium) -> None:
+    """Refuse an equilibrium of another robot or scene.
+
+    Raises:
+        ValueError: Saying which of them differs.
+    """
+    if equilibrium.robot is not robot and equilibrium.robot != robot:
+        raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
+    if equilibrium.scene is not scene and equilibrium.scene != scene:
+        raise ValueError("the equilibrium is of another scene; step from rest() of this solver")
 
 
 def _filled(values: tuple[float, ...], size: int) -> tuple[float, ...]:

@@ -12,14 +12,15 @@
 namespace ccr {
 
 // Each robot's answer is its own: it depends neither on the others, nor on how many threads share the work.
+template <int D>
 class Batch {
  public:
-  Batch(bool sliding, const Robot& robot, int count, int obstacles, int threads) : scenes_(count), pool_(threads - 1) {
-    for (int k = 0; k < threads; ++k) workers_.push_back(make_follower(sliding, robot, obstacles));
+  Batch(const Robot& robot, int count, int obstacles, int threads) : scenes_(count), pool_(threads - 1) {
+    for (int k = 0; k < threads; ++k) workers_.push_back(make_follower<D>(robot, obstacles));
   }
 
   std::size_t block_size() const { return workers_[0]->block_size(); }
-  std::vector<Obstacle>& scene(int robot) { return scenes_[robot]; }
+  std::vector<Obstacle<D>>& scene(int robot) { return scenes_[robot]; }
 
   // Calls `work` with a follower among the obstacles of each of some robots, and the place of the robot in the list.
   template <class Work>
@@ -27,7 +28,7 @@ class Batch {
     std::atomic<int> next = 0;
     const int count = static_cast<int>(robots.size());
     const auto run = [&](int thread) {
-      Follower& worker = *workers_[thread];
+      Follower<D>& worker = *workers_[thread];
       for (int first; (first = next.fetch_add(kChunk)) < count;)
         for (int k = first; k < std::min(first + kChunk, count); ++k) {
           worker.enter(scenes_[robots[k]]);
@@ -42,8 +43,8 @@ class Batch {
   static constexpr int kChunk = 2;   // robots taken at a time
   static constexpr int kAlone = 16;  // robots that are not worth waking a thread for
 
-  std::vector<std::vector<Obstacle>> scenes_;
-  std::vector<std::unique_ptr<Follower>> workers_;
+  std::vector<std::vector<Obstacle<D>>> scenes_;
+  std::vector<std::unique_ptr<Follower<D>>> workers_;
   Pool pool_;
 };
 

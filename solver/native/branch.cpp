@@ -4,35 +4,60 @@
 #include <cmath>
 #include <limits>
 
+#include "models.hpp"
+
 namespace ccr {
 
 using namespace limits;
 
 namespace {
 
-// How far apart two commands are, in steps of the cable [mm].
-double apart(const Command& a, const Command& b) {
-  return std::max(std::abs(a.cable - b.cable), std::abs(a.length - b.length) / 2);
+// How far apart two commands are, in steps of a cable [mm].
+template <int C>
+double apart(const Command<C>& a, const Command<C>& b) {
+  double farthest = std::abs(a.length - b.length) / 2;
+  for (int k = 0; k < C; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
+  return farthest;
 }
 
-Command between(const Command& a, const Command& b, double t) {
-  return {a.cable + t * (b.cable - a.cable), a.length + t * (b.length - a.length)};
+template <int C>
+Command<C> between(const Command<C>& a, const Command<C>& b, double t) {
+  Command<C> out;
+  for (int k = 0; k < C; ++k) out.cables[k] = a.cables[k] + t * (b.cables[k] - a.cables[k]);
+  out.length = a.length + t * (b.length - a.length);
+  return out;
+}
+
+// The largest of some numbers.
+template <int C>
+double highest(const Vec<C>& values) {
+  return *std::max_element(values.v.begin(), values.v.end());
+}
+
+template <int C>
+double pull(const Vec<C>& cables) {
+  double largest = 0;
+  for (const double cable : cables.v) largest = std::max(largest, std::abs(cable));
+  return largest;
+}
+
+template <class Block, std::size_t N>
+void read(Block& block, std::array<double, N>& numbers) {
+  std::copy_n(block, N, numbers.begin());
+  block += N;
 }
 
 }  // namespace
 
 template <class Model>
 Branch<Model>::Branch(const Robot& robot, int obstacles)
-    : newton_(robot, obstacles),
-      nodes_(robot.segments + 1),
-      levers_(robot.segments + 1),
-      points_(robot.points()) {
+    : newton_(robot, obstacles), nodes_(robot.segments + 1), frames_(robot.segments + 1), points_(robot.points()) {
   present_.controls.resize(robot.segments);
   trend_.controls.resize(robot.segments);
 }
 
 template <class Model>
-void Branch<Model>::enter(std::span<const Obstacle> obstacles) {
+void Branch<Model>::enter(std::span<const Obstacle<kSpace>> obstacles) {
   newton_.enter(obstacles);
   trend_.mounts.resize(newton_.chain.mounts());
   present_.mounts.resize(newton_.chain.mounts());
@@ -42,99 +67,105 @@ void Branch<Model>::enter(std::span<const Obstacle> obstacles) {
 template <class Model>
 std::size_t Branch<Model>::block_size() const {
   const std::size_t n = present_.controls.size(), contacts = newton_.chain.contacts();
-  const std::size_t obstacles = contacts / newton_.chain.points().size();
-  return 4 + n + 5 * (n + 1) + 2 * contacts + 4 * obstacles + 7 + newton_.chain.points().size() + n + 2 * obstacles +
-         kMaxActive;
+  const std::size_t points = newton_.chain.points().size(), obstacles = contacts / points;
+  const std::size_t of_frames = (n + 1) * Frame{}.v.size(), of_trend = n * Model::kControl + kSpace * obstacles + kMaxActive;
+  return 2 * kCables + 2 + n * Model::kControl + 3 * (n + 1) + of_frames + 2 * contacts + kSpace * (2 * obstacles + 1) + 1 +
+         kCables + Model::kTip + points + kTrend * of_trend;
 }
 
 template <class Model>
 void Branch<Model>::load(const double* block) {
-  const std::size_t n = present_.controls.size();
-  present_.command = {block[0], block[1]};
-  tension_ = block[2];
-  block += 4;
-  for (Control& control : present_.controls) control[0] = *block++;
-  for (std::size_t i = 0; i <= n; ++i) nodes_[i] = {{block[3 * i], block[3 * i + 1]}};
-  block += 3 * (n + 1);
-  for (std::size_t i = 0; i <= n; ++i, block += 2) levers_[i] = {{block[0] - nodes_[i][0], block[1] - nodes_[i][1]}};
-  const double* displacements = block + 2 * newton_.chain.contacts();
-  const int obstacles = static_cast<int>(newton_.chain.obstacles().size());
-  for (int j = 0; j < obstacles; ++j)
-    if (const int mount = newton_.chain.mount_of(j); mount >= 0)
-      present_.mounts[mount] = {{displacements[2 * j], displacements[2 * j + 1]}};
+  const Chain& chain = newton_.chain;
+  const int obstacles = static_cast<int>(chain.obstacles().size()), points = static_cast<int>(points_.size());
+  read(block, present_.command.cables.v);
+  present_.command.length = *block++;
+  read(block, tensions_.v);
+  ++block;
+  for (auto& control : present_.controls) read(block, control.v);
+  for (Position& node : nodes_) {
+    std::copy_n(block, kSpace, node.v.begin());
+    block += 3;
+  }
+  for (Frame& frame : frames_) read(block, frame.v);
+  const double* multipliers = block;
+  block += 2 * chain.contacts();
+  const auto read_mounts = [&](std::vector<Position>& mounts) {
+    for (int j = 0; j < obstacles; ++j, block += kSpace)
+      if (const int mount = chain.mount_of(j); mount >= 0) std::copy_n(block, kSpace, mounts[mount].v.begin());
+  };
+  read_mounts(present_.mounts);
   mounts_ = present_.mounts;
   newton_.chain.look_around(nodes_, present_.mounts);
-  place_points(newton_.chain.robot(), nodes_, levers_, points_);
+  place_points<Model>(chain.robot(), nodes_, frames_, points_);
+  block += kSpace * (obstacles + 1) + 1;
+  read(block, onset_.v);
+  block += Model::kTip;
   ActiveSet& active = present_.active;
   active.count = 0;
-  const double* flags = displacements + 4 * obstacles + 7;
-  const int points = static_cast<int>(points_.size());
-  if (std::find(flags, flags + points, 1.0) != flags + points)
-    for (int c = 0; c < newton_.chain.contacts(); ++c)
-      if (flags[c % points] != 0 && block[c] > 0 && active.count < kMaxActive) {
+  if (std::find(block, block + points, 1.0) != block + points)
+    for (int c = 0; c < chain.contacts(); ++c)
+      if (block[c % points] != 0 && multipliers[c] > 0 && active.count < kMaxActive) {
         active.contact[active.count] = c;
-        active.multiplier[active.count++] = block[c];
+        active.multiplier[active.count++] = multipliers[c];
       }
-  if (Model::kSliding && tension_ > 0 && active.count < kMaxActive) {
-    active.contact[active.count] = newton_.chain.contacts();
-    active.multiplier[active.count++] = tension_ / newton_.chain.robot().stiffness(present_.command.length);
+  block += points;
+  if (Model::kSliding && tensions_[0] > 0 && active.count < kMaxActive) {
+    active.contact[active.count] = chain.contacts();
+    active.multiplier[active.count++] = tensions_[0] / chain.robot().stiffness(present_.command.length);
   }
   settled_ = false;
-  touched_ = newton_.chain.touching(active);
-  onset_ = displacements[4 * obstacles + 3];
-  const double* trend = displacements + 4 * obstacles + 7 + points_.size();
-  for (Control& control : trend_.controls) control[0] = *trend++;
-  for (int j = 0; j < obstacles; ++j, trend += 2)
-    if (const int mount = newton_.chain.mount_of(j); mount >= 0) trend_.mounts[mount] = {{trend[0], trend[1]}};
-  std::copy_n(trend, kMaxActive, trend_.multipliers.begin());
+  touched_ = chain.touching(active);
+  if (!kTrend) return;
+  for (auto& control : trend_.controls) read(block, control.v);
+  read_mounts(trend_.mounts);
+  read(block, trend_.multipliers);
 }
 
 template <class Model>
 void Branch<Model>::store(double* block) {
-  Chain<Model>& chain = newton_.chain;
-  const std::size_t n = present_.controls.size();
-  *block++ = present_.command.cable;
+  Chain& chain = newton_.chain;
+  const ActiveSet& active = present_.active;
+  const auto write = [&](const auto& numbers) { block = std::copy(numbers.v.begin(), numbers.v.end(), block); };
+  write(present_.command.cables);
   *block++ = present_.command.length;
-  *block++ = tension_;
+  write(tensions_);
   *block++ = chain.objective();
-  for (const Control& control : present_.controls) *block++ = control[0];
+  for (const auto& control : present_.controls) write(control);
   for (const auto& state : chain.states()) block = std::copy_n(state.v.begin(), 3, block);
-  for (std::size_t i = 0; i <= n; ++i)
-    for (int k = 0; k < 2; ++k) *block++ = chain.states()[i][k] + chain.levers()[i][k];
+  for (const Frame& frame : chain.frames()) write(frame);
   std::fill_n(block, chain.contacts(), 0.0);
-  for (int j = 0; j < present_.active.count; ++j)
-    if (present_.active.contact[j] < chain.contacts()) block[present_.active.contact[j]] = present_.active.multiplier[j];
+  for (int j = 0; j < active.count; ++j)
+    if (active.contact[j] < chain.contacts()) block[active.contact[j]] = active.multiplier[j];
   block += chain.contacts();
   chain.survey(block);
   const double clearance = lowest(chain.contacts(), [&](int c) { return block[c]; });
   block += chain.contacts();
   const int obstacles = static_cast<int>(chain.obstacles().size());
-  const auto write = [&](const Position& pair) { block = std::copy(pair.v.begin(), pair.v.end(), block); };
-  const auto of_mount = [&](const std::vector<Position>& mounts, int j) {
-    return chain.mount_of(j) < 0 ? Position{} : mounts[chain.mount_of(j)];
+  const auto write_mounts = [&](const std::vector<Position>& mounts) {
+    for (int j = 0; j < obstacles; ++j) write(chain.mount_of(j) < 0 ? Position{} : mounts[chain.mount_of(j)]);
   };
-  for (int j = 0; j < obstacles; ++j) write(of_mount(present_.mounts, j));
+  write_mounts(present_.mounts);
   Position total{};
   for (int j = 0; j < obstacles; ++j) {
-    const Position force = chain.push(present_.active, j);
+    const Position force = chain.push(active, j);
     total += force;
     write(force);
   }
   write(total);
   *block++ = clearance;
-  *block++ = onset_;
-  const Vec<3> slopes = chain.free_slopes(present_.command);
-  block = std::copy(slopes.v.begin(), slopes.v.end(), block);
+  write(onset_);
+  write(chain.free_slopes(present_.command));
   const std::size_t points = chain.points().size();
   std::fill_n(block, points, 0.0);
-  for (int j = 0; j < present_.active.count; ++j)
-    if (present_.active.contact[j] < chain.contacts()) block[present_.active.contact[j] % points] = 1;
+  for (int j = 0; j < active.count; ++j)
+    if (active.contact[j] < chain.contacts()) block[active.contact[j] % points] = 1;
   block += points;
-  for (const Control& control : trend_.controls) *block++ = control[0];
-  for (int j = 0; j < obstacles; ++j) write(of_mount(trend_.mounts, j));
+  if (!kTrend) return;
+  for (const auto& control : trend_.controls) write(control);
+  write_mounts(trend_.mounts);
   std::fill_n(block, kMaxActive, 0.0);
-  const auto begin = present_.active.contact.begin(), end = begin + present_.active.count;
-  for (int j = 0; j < present_.active.count; ++j) {
+  const auto begin = active.contact.begin(), end = begin + active.count;
+  for (int j = 0; j < active.count; ++j) {
     const auto rank = std::count_if(begin, end, [&](int contact) { return contact < begin[j]; });
     block[rank] = trend_.multipliers[j];
   }
@@ -152,29 +183,32 @@ template <class Model>
 void Branch<Model>::accept() {
   learn();
   std::swap(present_, trial_);
-  tension_ = trial_tension_;
+  tensions_ = trial_tensions_;
   settled_ = true;
   remember();
 }
 
 template <class Model>
 void Branch<Model>::learn() {
+  if (!kTrend) return;
   const ActiveSet &before = present_.active, &now = trial_.active;
-  const double pulled = trial_.command.cable - present_.command.cable;
+  const double pulled = trial_.command.cables[0] - present_.command.cables[0];
   forget();
   if (pulled == 0 || trial_.command.length != present_.command.length || !newton_.chain.touching(now) ||
       before.count != now.count || !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
     return;
+  const auto slope = [&](const auto& now, const auto& before, auto& slope) {
+    for (std::size_t k = 0; k < slope.v.size(); ++k) slope[k] = (now[k] - before[k]) / pulled;
+  };
   for (std::size_t i = 0; i < trend_.controls.size(); ++i)
-    trend_.controls[i][0] = (trial_.controls[i][0] - present_.controls[i][0]) / pulled;
-  for (std::size_t m = 0; m < trend_.mounts.size(); ++m)
-    for (int k = 0; k < 2; ++k) trend_.mounts[m][k] = (trial_.mounts[m][k] - present_.mounts[m][k]) / pulled;
+    slope(trial_.controls[i], present_.controls[i], trend_.controls[i]);
+  for (std::size_t m = 0; m < trend_.mounts.size(); ++m) slope(trial_.mounts[m], present_.mounts[m], trend_.mounts[m]);
   for (int j = 0; j < now.count; ++j) trend_.multipliers[j] = (now.multiplier[j] - before.multiplier[j]) / pulled;
 }
 
 template <class Model>
 void Branch<Model>::forget() {
-  std::fill(trend_.controls.begin(), trend_.controls.end(), Control{});
+  std::fill(trend_.controls.begin(), trend_.controls.end(), typename Model::Control{});
   std::fill(trend_.mounts.begin(), trend_.mounts.end(), Position{});
   trend_.multipliers.fill(0);
 }
@@ -182,12 +216,13 @@ void Branch<Model>::forget() {
 // From `present_` along the trend.
 template <class Model>
 void Branch<Model>::predict() {
-  const double pulled = trial_.command.cable - present_.command.cable;
-  for (std::size_t i = 0; i < trend_.controls.size(); ++i)
-    trial_.controls[i][0] = present_.controls[i][0] + pulled * trend_.controls[i][0];
-  for (std::size_t m = 0; m < trend_.mounts.size(); ++m)
-    for (int k = 0; k < 2; ++k) trial_.mounts[m][k] = present_.mounts[m][k] + pulled * trend_.mounts[m][k];
-  trial_.active = present_.active;
+  if (!kTrend) return;
+  const double pulled = trial_.command.cables[0] - present_.command.cables[0];
+  const auto go_on = [&](auto& at, const auto& slope) {
+    for (std::size_t k = 0; k < slope.v.size(); ++k) at[k] += pulled * slope[k];
+  };
+  for (std::size_t i = 0; i < trend_.controls.size(); ++i) go_on(trial_.controls[i], trend_.controls[i]);
+  for (std::size_t m = 0; m < trend_.mounts.size(); ++m) go_on(trial_.mounts[m], trend_.mounts[m]);
   for (int j = 0; j < trial_.active.count; ++j)
     trial_.active.multiplier[j] = std::max(0.0, trial_.active.multiplier[j] + pulled * trend_.multipliers[j]);
 }
@@ -197,14 +232,14 @@ void Branch<Model>::settle() {
   if (settled_) return;
   newton_.chain.evaluate(present_);
   newton_.chain.reduced_gradient(present_.active);
-  tension_ = newton_.chain.tension(present_.active);
+  tensions_ = newton_.chain.tensions(present_.active);
   settled_ = true;
 }
 
 // Whether every point came here from the last accepted shape without cutting through an obstacle or jumping.
 template <class Model>
 bool Branch<Model>::passable(double allowed) const {
-  const Chain<Model>& chain = newton_.chain;
+  const Chain& chain = newton_.chain;
   const int points = chain.robot().points();
   double farthest = 0, shift = 0;
   for (int k = 0; k < points; ++k) {
@@ -216,7 +251,7 @@ bool Branch<Model>::passable(double allowed) const {
     shift = std::max(shift, norm(minus(trial_.mounts[m], mounts_[m])));
   if (std::max(farthest, shift) > allowed) return false;
   for (std::size_t j = 0; j < chain.obstacles().size(); ++j) {
-    const Obstacle& obstacle = chain.obstacles()[j];
+    const auto& obstacle = chain.obstacles()[j];
     if (farthest + shift <= kSweepStride * obstacle.fineness || chain.far(static_cast<int>(j), farthest)) continue;
     const int mount = chain.mount_of(j);
     const Position before = mount < 0 ? Position{} : mounts_[mount], now = mount < 0 ? Position{} : trial_.mounts[mount];
@@ -241,7 +276,7 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   trial_ = present_;
   trial_.command = command;
   if (!attempt_free()) {
-    if (!Model::kSliding && command.cable <= 0) return Move::kRejected;
+    if (!Model::kSliding && pull(command.cables) <= 0) return Move::kRejected;
     predict();
     const Verdict verdict = newton_.solve(trial_);
     iterations += verdict.iterations;
@@ -250,16 +285,25 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   if (!passable(std::min(kMoveOffset + kMoveSlope * apart(present_.command, command), kMoveLargest)))
     return Move::kRejected;
   newton_.chain.reduced_gradient(trial_.active);
-  trial_tension_ = newton_.chain.tension(trial_.active);
-  const bool pulled = command.cable > present_.command.cable && command.length == present_.command.length;
-  const bool rising = pulled || (!releases(command) && trial_tension_ > tension_);
-  return rising && trial_tension_ > newton_.chain.robot().max_tension ? Move::kOverTension : Move::kAccepted;
+  trial_tensions_ = newton_.chain.tensions(trial_.active);
+  const double tension = highest(trial_tensions_);
+  const bool pulled = pulls(command) && command.length == present_.command.length;
+  const bool rising = pulled || (!releases(command) && tension > highest(tensions_));
+  return rising && tension > newton_.chain.robot().max_tension ? Move::kOverTension : Move::kAccepted;
 }
 
-// Whether a command only lets the cable out.
+// Whether a command pulls a cable.
+template <class Model>
+bool Branch<Model>::pulls(const Command& command) const {
+  for (int k = 0; k < kCables; ++k)
+    if (std::abs(command.cables[k]) > std::abs(present_.command.cables[k])) return true;
+  return false;
+}
+
+// Whether a command only lets cables out.
 template <class Model>
 bool Branch<Model>::releases(const Command& command) const {
-  return command.cable < present_.command.cable && command.length == present_.command.length;
+  return !pulls(command) && command.length == present_.command.length && !(command == present_.command);
 }
 
 // `present_` is below the tension limit, `trial_` above: close in from below by false position (Illinois), aiming into
@@ -269,7 +313,8 @@ bool Branch<Model>::approach_limit() {
   const double aim = newton_.chain.robot().max_tension * (1 - kTensionBand / 2);
   const Command start = present_.command, end = trial_.command;
   const double span = apart(start, end);
-  double low = 0, high = 1, excess = trial_tension_ - aim, shortage = tension_ - aim;  // fractions of the way
+  double low = 0, high = 1;  // fractions of the way
+  double excess = highest(trial_tensions_) - aim, shortage = highest(tensions_) - aim;
   Move last = Move::kRejected;
   for (int i = 0; i < kStallIterations && !at_limit(); ++i) {
     const double width = high - low;
@@ -280,11 +325,11 @@ bool Branch<Model>::approach_limit() {
     if (move == Move::kAccepted) {
       accept();
       low = middle;
-      shortage = tension_ - aim;
+      shortage = highest(tensions_) - aim;
       if (move == last) excess /= 2;
     } else {
       high = middle;
-      excess = trial_tension_ - aim;
+      excess = highest(trial_tensions_) - aim;
       if (move == last) shortage /= 2;
     }
     last = move;
@@ -355,23 +400,59 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     settled_ = false;
     forget();
     settle();
-    if (holding && tension_ > newton_.chain.robot().max_tension) return undo(End::kOverTension);
+    if (holding && highest(tensions_) > newton_.chain.robot().max_tension) return undo(End::kOverTension);
     double farthest = 0;
     for (std::size_t k = 0; k < points_.size(); ++k)
-      farthest = std::max(farthest, std::hypot(points_[k][0] - start_points[k][0], points_[k][1] - start_points[k][1]));
+      farthest = std::max(farthest, norm(minus(points_[k], start_points[k])));
     return farthest > kMoveOffset ? End::kSnapped : End::kPassed;
   }
   return undo(End::kBlocked);
 }
 
 template <class Model>
-bool Branch<Model>::at_limit() const { return tension_ >= newton_.chain.robot().max_tension * (1 - kTensionBand); }
+bool Branch<Model>::at_limit() const {
+  return highest(tensions_) >= newton_.chain.robot().max_tension * (1 - kTensionBand);
+}
 
-// A robot that touches is not slackened below its pretension where the cable alone gives it its shape.
+// Where a command leads: a robot that touches is not slackened below its pretension where the cables alone give it its
+// shape.
 template <class Model>
-double Branch<Model>::goal_cable(double target) const {
-  if (Model::kSliding || !newton_.chain.touching(present_.active)) return target;
-  return std::max(target, std::min(present_.command.cable, kPretension));
+Branch<Model>::Command Branch<Model>::goal(Command wanted) const {
+  if (Model::kSliding || pull(wanted.cables) >= kPretension || !newton_.chain.touching(present_.active)) return wanted;
+  int taut = 0;
+  for (int k = 1; k < kCables; ++k)
+    if (std::abs(present_.command.cables[k]) > std::abs(present_.command.cables[taut])) taut = k;
+  const double present = present_.command.cables[taut];
+  const double least = std::min(std::abs(present), kPretension);
+  if (std::abs(wanted.cables[taut]) < least) wanted.cables[taut] = std::copysign(least, present);
+  return wanted;
+}
+
+// Gives up pulling the cables that are at the tension limit, or else all that are pulled; false where there is but one.
+template <class Model>
+bool Branch<Model>::hold(Command& wanted) const {
+  if (kCables == 1) return false;
+  const auto give_up = [&](double tension) {
+    bool held = false;
+    for (int k = 0; k < kCables; ++k) {
+      const double present = present_.command.cables[k];
+      if (tensions_[k] < tension || std::abs(wanted.cables[k]) <= std::abs(present)) continue;
+      wanted.cables[k] = present;
+      held = true;
+    }
+    return held;
+  };
+  return give_up(newton_.chain.robot().max_tension * (1 - kTensionBand)) || give_up(-HUGE_VAL);
+}
+
+// Lets out the cables whose motors cannot hold them.
+template <class Model>
+void Branch<Model>::yield(Command& wanted) const {
+  for (int k = 0; k < kCables; ++k) {
+    const double present = present_.command.cables[k];
+    if (tensions_[k] > newton_.chain.robot().max_tension)
+      wanted.cables[k] = std::copysign(std::max(std::abs(present) - kYield, 0.0), present);
+  }
 }
 
 template <class Model>
@@ -382,26 +463,25 @@ Status Branch<Model>::follow(const Command& target) {
   bool refined = false;  // the last attempt was rejected: do not grow again at once
   const int steps = kSubSteps + static_cast<int>(2 * apart(present_.command, target) / kLargestStep);
   for (int sub = 0, ends = 0; sub < steps && ends < kBranchEnds; ++sub) {
-    const Command goal = {goal_cable(wanted.cable), wanted.length};
+    const Command goal = this->goal(wanted);
     const double remaining = apart(present_.command, goal);
     if (remaining == 0) {
       // A release may end in a snap to more tension than the motor holds: it yields until it holds again.
-      if (tension_ <= newton_.chain.robot().max_tension || present_.command.cable == 0) return reached;
-      wanted.cable = std::max(present_.command.cable - kYield, 0.0);
+      if (highest(tensions_) <= newton_.chain.robot().max_tension || pull(present_.command.cables) == 0) return reached;
+      yield(wanted);
       reached = Status::kStalled;
       continue;
     }
-    if (goal.cable > present_.command.cable && goal.length == present_.command.length && at_limit())
-      return Status::kStalled;
+    bool stalled = kCables == 1 && at_limit() && pulls(goal) && goal.length == present_.command.length;
     const double size = std::min(step, remaining);
     const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
-    const Move move = attempt(next);
+    const Move move = stalled ? Move::kOverTension : attempt(next);
     if (move == Move::kAccepted) {
       accept();
       step = refined ? size : std::min(2 * size, kLargestStep);
       refined = false;
     } else if (move == Move::kOverTension) {
-      if (approach_limit()) return Status::kStalled;
+      stalled = stalled || approach_limit();
       step = size / 2;
     } else if (size > kSmallestStep) {
       step = size / 2;
@@ -409,19 +489,23 @@ Status Branch<Model>::follow(const Command& target) {
     } else {
       const End end = pass_end(next);
       if (end == End::kBlocked) return Status::kJammed;
-      if (end == End::kOverTension) return Status::kStalled;
+      stalled = end == End::kOverTension;
       if (end == End::kSnapped) reached = Status::kSnapped;
       step = 2 * kSmallestStep;
       refined = false;
       ++ends;
     }
+    if (stalled) {
+      reached = Status::kStalled;
+      if (!hold(wanted)) return reached;
+    }
   }
   return Status::kJammed;
 }
 
-// Tension of the free robot where it first touches, between where the step began and where it is.
+// Tensions of the free robot where it first touches, between where the step began and where it is.
 template <class Model>
-double Branch<Model>::first_tension(const Command& start) {
+Branch<Model>::Tensions Branch<Model>::first_tensions(const Command& start) {
   const auto clear = [&](double part) {
     trial_.command = between(start, present_.command, part);
     newton_.chain.relax(trial_);
@@ -435,23 +519,26 @@ double Branch<Model>::first_tension(const Command& start) {
     }
   clear(high);
   newton_.chain.reduced_gradient(trial_.active);
-  return newton_.chain.tension(trial_.active);
+  return newton_.chain.tensions(trial_.active);
 }
 
 template <class Model>
-Status Branch<Model>::follow(const double* from, const Command& target, double* to) {
+Status Branch<Model>::follow(const double* from, const double* target, double* to) {
   iterations = 0;
   load(from);
   const Command start = present_.command;
+  Command wanted;
+  read(target, wanted.cables.v);
+  wanted.length = *target;
   if (trace) {
     settle();
     remember();
   }
-  const Status status = follow(target);
+  const Status status = follow(wanted);
   if (!newton_.chain.touching(present_.active)) {
-    onset_ = 0;
+    onset_ = {};
   } else if (!touched_) {
-    onset_ = first_tension(start);
+    onset_ = first_tensions(start);
     settled_ = false;
   }
   settle();
@@ -460,15 +547,19 @@ Status Branch<Model>::follow(const double* from, const Command& target, double* 
 }
 
 template <class Model>
-bool Branch<Model>::reaches(double force, double increment, double limit, double length) {
+bool Branch<Model>::reaches(double force, const double* direction, double increment, double limit, double length) {
+  Command command{{}, length};
   std::vector<double> rest(block_size());
-  rest[1] = length;
-  follow(rest.data(), {0, length}, rest.data());
+  rest[kCables] = length;
+  Vec<kCables + 1> straight{};
+  straight[kCables] = length;
+  follow(rest.data(), straight.v.data(), rest.data());
   if (newton_.chain.violation() > 0) return false;
   load(rest.data());
   const int obstacles = static_cast<int>(newton_.chain.obstacles().size());
   for (int i = 1; i * increment < limit; ++i) {
-    if (follow({i * increment, length}) != Status::kConverged) return false;
+    for (int k = 0; k < kCables; ++k) command.cables[k] = i * increment * direction[k];
+    if (follow(command) != Status::kConverged) return false;
     settle();
     Position total{};
     for (int j = 0; j < obstacles; ++j) total += newton_.chain.push(present_.active, j);
@@ -477,12 +568,19 @@ bool Branch<Model>::reaches(double force, double increment, double limit, double
   return false;
 }
 
-template class Branch<UniformCable>;
-template class Branch<SlidingCable>;
+#define CCR_INSTANTIATE(Model) template class Branch<Model>;
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
 
-std::unique_ptr<Follower> make_follower(bool sliding, const Robot& robot, int obstacles) {
-  if (sliding) return std::make_unique<Branch<SlidingCable>>(robot, obstacles);
-  return std::make_unique<Branch<UniformCable>>(robot, obstacles);
+template <>
+std::unique_ptr<Follower<2>> make_follower(const Robot& robot, int obstacles) {
+  if (robot.sliding) return std::make_unique<Branch<Planar<SlidingCable>>>(robot, obstacles);
+  return std::make_unique<Branch<Planar<UniformCable>>>(robot, obstacles);
+}
+
+template <>
+std::unique_ptr<Follower<3>> make_follower(const Robot& robot, int obstacles) {
+  return std::make_unique<Branch<Spatial>>(robot, obstacles);
 }
 
 }  // namespace ccr

@@ -13,54 +13,69 @@ namespace ccr {
 
 enum class Status { kConverged, kSnapped, kStalled, kJammed, kFailed };
 
-// What is the same for all models of a robot.
+// What is the same for all models of a robot in the plane or in space.
+template <int D>
 class Follower {
  public:
   virtual ~Follower() = default;
 
-  // An equilibrium as one block of numbers, in this order: cable, length, tension, objective; coordinate of each
-  // segment; x, y, angle of each node; x, y of each cable point; multiplier of each contact; gap of each contact;
-  // displacement x, y of each obstacle; force x, y of each obstacle on the robot; force x, y of all of them; smallest
-  // gap; tension where the present contact began, 0 without one; slopes of the free tip's x, y, angle; 1 for each point
-  // that touches, else 0; trend of the coordinates, of the displacements, and of the multipliers of the active contacts in
-  // the order of the contacts.
+  // An equilibrium as one block of numbers, in this order: cables, length, tensions, objective; coordinates of each
+  // segment; x, y, angle or x, y, z of each node; frame of each node, the direction of the cable or a rotation matrix;
+  // multiplier of each contact; gap of each contact; displacement of each obstacle; force of each obstacle on the robot;
+  // force of all of them; smallest gap; tensions where the present contact began, 0 without one; slopes of the free tip; 1
+  // for each point that touches, else 0; and with one cable the trend of the coordinates, of the displacements, and of the
+  // multipliers of the active contacts in the order of the contacts.
   virtual std::size_t block_size() const = 0;
 
   // Goes among other obstacles, as many as before, which must stay where they are.
-  virtual void enter(std::span<const Obstacle> obstacles) = 0;
+  virtual void enter(std::span<const Obstacle<D>> obstacles) = 0;
 
-  // Takes the robot from the equilibrium in one block towards `target`, cable and length evenly, and writes the one
+  // Takes the robot from the equilibrium in one block towards the `target`, cables and length evenly, and writes the one
   // reached to another.
-  virtual Status follow(const double* from, const Command& target, double* to) = 0;
+  virtual Status follow(const double* from, const double* target, double* to) = 0;
 
-  // Whether steady pulls from rest, of this increment and to less than this limit, reach a contact force without an event
-  // on the way; false as well when the robot at rest is not clear of the obstacles.
-  virtual bool reaches(double force, double increment, double limit, double length) = 0;
+  // Whether steady pulls from rest, of this increment along a direction and to less than this limit, reach a contact force
+  // without an event on the way; false as well when the robot at rest is not clear of the obstacles.
+  virtual bool reaches(double force, const double* direction, double increment, double limit, double length) = 0;
 
   int iterations = 0;                    // of Newton's method in the last follow
-  std::vector<double>* trace = nullptr;  // when set, receives (x, y, angle) of every node at every accepted shape
+  std::vector<double>* trace = nullptr;  // when set, receives the three numbers of every node at every accepted shape
 };
 
 // How an equilibrium has changed per millimetre of cable, to start the search for the next one; zero where it is free, or
 // a contact came or went.
+template <class Model>
 struct Trend {
-  std::vector<Control> controls;
-  std::vector<Position> mounts;
+  std::vector<typename Model::Control> controls;
+  std::vector<Position<Model::kSpace>> mounts;
   std::array<double, limits::kMaxActive> multipliers{};  // in the order of the active set
 };
 
-// The follower for a robot with a uniform or a sliding cable, for scenes of this many obstacles.
-std::unique_ptr<Follower> make_follower(bool sliding, const Robot& robot, int obstacles);
+// The follower for a robot, for scenes of this many obstacles.
+template <int D>
+std::unique_ptr<Follower<D>> make_follower(const Robot& robot, int obstacles);
 
 template <class Model>
-class Branch : public Follower {
+class Branch : public Follower<Model::kSpace> {
  public:
+  static constexpr int kSpace = Model::kSpace, kCables = Model::kCables;
+  static constexpr bool kTrend = kCables == 1;  // whether steps are so much alike that the last one tells of the next
+  using Chain = ccr::Chain<Model>;
+  using Position = ccr::Position<kSpace>;
+  using Command = ccr::Command<kCables>;
+  using Iterate = ccr::Iterate<Model>;
+  using Frame = typename Model::Frame;
+  using Tensions = Vec<kCables>;
+
+  using Follower<kSpace>::iterations;
+  using Follower<kSpace>::trace;
+
   Branch(const Robot& robot, int obstacles);
 
   std::size_t block_size() const override;
-  void enter(std::span<const Obstacle> obstacles) override;
-  Status follow(const double* from, const Command& target, double* to) override;
-  bool reaches(double force, double increment, double limit, double length) override;
+  void enter(std::span<const Obstacle<kSpace>> obstacles) override;
+  Status follow(const double* from, const double* target, double* to) override;
+  bool reaches(double force, const double* direction, double increment, double limit, double length) override;
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension };
@@ -68,13 +83,16 @@ class Branch : public Follower {
 
   void load(const double* block);
   void store(double* block);
-  double first_tension(const Command& start);
+  Tensions first_tensions(const Command& start);
   Status follow(const Command& target);
-  double goal_cable(double target) const;
+  Command goal(Command wanted) const;
+  bool hold(Command& wanted) const;
+  void yield(Command& wanted) const;
   Move attempt(const Command& command);
   bool attempt_free();
   bool approach_limit();
   bool at_limit() const;
+  bool pulls(const Command& command) const;
   bool releases(const Command& command) const;
   End pass_end(const Command& command);
   bool finish();
@@ -90,11 +108,12 @@ class Branch : public Follower {
 
   Newton<Model> newton_;
   Iterate present_, trial_;
-  Trend trend_;  // of `present_`
-  double tension_ = 0, trial_tension_ = 0;
-  double onset_ = 0;      // tension where the present contact began
+  Trend<Model> trend_;  // of `present_`
+  Tensions tensions_{}, trial_tensions_{};
+  Tensions onset_{};      // tensions where the present contact began
   bool touched_ = false;  // at the start
-  std::vector<Position> nodes_, levers_;  // of the block last read
+  std::vector<Position> nodes_;  // of the block last read
+  std::vector<Frame> frames_;
   std::vector<Position> points_, mounts_;  // of the last accepted shape
   bool settled_ = false;                  // whether the chain is evaluated at `present_`
 };

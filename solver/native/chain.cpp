@@ -4,37 +4,25 @@
 #include <cmath>
 #include <limits>
 
+#include "models.hpp"
+
 namespace ccr {
 
-namespace {
-
-// A chord d in the base frame seen by the adjoint p of the node it leads to: its moment about the lower node, where a
-// turn moves the upper one by (-dy, dx), and -p·d.
-template <class Bend, int N>
-double moment(const Vec<N>& p, const Bend& bend) {
-  return p[1] * bend.dx - p[0] * bend.dy;
-}
-
-template <class Bend, int N>
-double inward(const Vec<N>& p, const Bend& bend) {
-  return -(p[0] * bend.dx + p[1] * bend.dy);
-}
-
-}  // namespace
-
-void place_points(const Robot& robot, std::span<const Position> nodes, std::span<const Position> levers,
-                  std::vector<Position>& points) {
+template <class Model>
+void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> nodes,
+                  std::span<const typename Model::Frame> frames, std::vector<Position<Model::kSpace>>& points) {
   const int stride = robot.between + 1;
-  Position* point = points.data();
-  for (const double line : robot.lines) {
-    const double scale = line / robot.offset;
-    for (int i = 0; i <= robot.segments; ++i)
-      point[i * stride] = {{nodes[i][0] + scale * levers[i][0], nodes[i][1] + scale * levers[i][1]}};
+  auto* point = points.data();
+  for (const Vec<2>& line : robot.lines) {
+    for (int i = 0; i <= robot.segments; ++i) {
+      point[i * stride] = nodes[i];
+      point[i * stride] += Model::lever(frames[i], line);
+    }
     for (int i = 0; i < robot.segments; ++i)
       for (int k = 1; k < stride; ++k) {
-        const Position &here = point[i * stride], &next = point[(i + 1) * stride];
+        const auto &here = point[i * stride], &next = point[(i + 1) * stride];
         const double t = static_cast<double>(k) / stride;
-        point[i * stride + k] = {{here[0] + t * (next[0] - here[0]), here[1] + t * (next[1] - here[1])}};
+        for (int c = 0; c < Model::kSpace; ++c) point[i * stride + k][c] = here[c] + t * (next[c] - here[c]);
       }
     point += robot.positions();
   }
@@ -43,25 +31,21 @@ void place_points(const Robot& robot, std::span<const Position> nodes, std::span
 template <class Model>
 Chain<Model>::Chain(const Robot& robot, int obstacles)
     : robot_(robot),
-      bends_(robot.segments),
-      one_(1),
+      model_(robot),
       origin_(robot.segments + 1),
       clear_(obstacles),
-      states_(robot.segments + 1),
       nodes_(robot.segments + 1),
-      levers_(robot.segments + 1),
       points_(robot.points()),
       gaps_(obstacles * points_.size() + Model::kSliding, std::numeric_limits<double>::infinity()),
       mount_of_(obstacles, -1),
-      pulls_(robot.segments + 1),
-      adjoints_(robot.segments),
-      gradient_(robot.segments) {
+      pulls_(robot.segments + 1) {
   near_.reserve(gaps_.size());
   const int stride = robot.between + 1;
-  for (const double line : robot.lines)
+  for (const Vec<2>& line : robot.lines) {
     for (int k = 0; k < robot.positions(); ++k)
-      sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line / robot.offset});
-  for (const double line : robot.lines) reach_ = std::max(reach_, std::abs(line));
+      sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line});
+    reach_ = std::max(reach_, norm(line));
+  }
   reach_ += limits::kReach + (robot.between > 0 ? robot.max_length / robot.segments : 0);
 }
 
@@ -97,71 +81,27 @@ bool Chain<Model>::far(int obstacle, double motion) const {
 
 template <class Model>
 bool Chain<Model>::evaluate(const Iterate& at) {
-  const Command& command = at.command;
-  const int n = robot_.segments;
-  pull_ = command.cable / n;
-  length_ = command.length / n;
-  objective_ = steepest_ = 0;
-  Model::bend(n, at.controls[0].v.data(), pull_, length_, robot_.offset, bends_);
-  states_[0] = {};
-  levers_[0] = {{robot_.offset, 0}};
-  const double scale = length_ / robot_.offset;
-  double widest = 0;
-  for (int i = 0; i < n; ++i) {
-    const auto bend = bends_[i];
-    const double c = levers_[i][0], s = levers_[i][1];  // of the lower disk, times the offset
-    const double dx = -scale * (s * bend.forward + c * bend.sideways);
-    const double dy = scale * (c * bend.forward - s * bend.sideways);
-    bends_.place(i, dx, dy);
-    levers_[i + 1] = {{c * bend.cosine + s * bend.sine, s * bend.cosine - c * bend.sine}};
-    State& next = states_[i + 1];
-    next = states_[i];
-    next[0] += dx;
-    next[1] += dy;
-    next[2] -= bend.angle;
-    if constexpr (Model::kSliding) next[3] += bend.taken;
-    objective_ += bend.angle * bend.angle;
-    steepest_ = std::max(steepest_, std::abs(2 * bend.angle * bend.slope));
-    widest = std::max(widest, std::abs(bend.angle));
-  }
-  if (!std::isfinite(objective_) || (Model::kSliding && widest > limits::kWidestTurn)) return false;
+  if (!model_.evaluate(at.command, at.controls)) return false;
   load_springs(at.mounts);
-  for (int i = 0; i <= n; ++i) nodes_[i] = {{states_[i][0], states_[i][1]}};
-  place_points(robot_, nodes_, levers_, points_);
-  measure_gaps(Model::kSliding ? states_[n][Model::kState - 1] - command.cable : 0);
+  for (int i = 0; i <= robot_.segments; ++i) std::copy_n(states()[i].v.begin(), kSpace, nodes_[i].v.begin());
+  place_points<Model>(robot_, nodes_, frames(), points_);
+  if constexpr (Model::kSliding)
+    measure_gaps(model_.slack(at.command));
+  else
+    measure_gaps(0);
   return true;
 }
 
 template <class Model>
 void Chain<Model>::load_springs(const std::vector<Position>& mounts) {
   displacements_ = mounts;
-  energy_ = objective_;
+  energy_ = objective();
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
     const int mount = mount_of_[j];
     if (mount < 0) continue;
-    for (int k = 0; k < 4; ++k) springs_[mount][k] = obstacles_[j].stiffness[k] / stiffness();
+    for (int k = 0; k < kSpace * kSpace; ++k) springs_[mount][k] = obstacles_[j].stiffness[k] / stiffness();
     energy_ += dot(mounts[mount], times(springs_[mount], mounts[mount])) / 2;
   }
-}
-
-template <class Model>
-Control Chain<Model>::relaxed(const Command& command) {
-  const double pull = command.cable / robot_.segments, length = command.length / robot_.segments;
-  if (command.cable == relaxed_at_.cable && command.length == relaxed_at_.length) return relaxed_;
-  relaxed_at_ = command;
-  relaxed_ = {};
-  if constexpr (Model::kSliding) relaxed_[0] = pull / robot_.offset;
-  for (int i = 0; i <= limits::kRelaxIterations; ++i) {
-    Model::bend(1, relaxed_.v.data(), pull, length, robot_.offset, one_);
-    if constexpr (!Model::kSliding) {
-      break;
-    } else {
-      const double change = (one_[0].taken - pull) / one_[0].taken_slope;
-      relaxed_[0] -= change;
-      if (std::abs(change) <= limits::kRelaxed * std::abs(relaxed_[0])) break;
-    }
-  }
-  return relaxed_;
 }
 
 template <class Model>
@@ -170,10 +110,10 @@ void Chain<Model>::relax(Iterate& at) {
   std::fill(at.mounts.begin(), at.mounts.end(), Position{});
   Control control{};
   if constexpr (Model::kSliding)
-    if (at.command.cable > 0) {
-      control = relaxed(at.command);
+    if (at.command.cables[0] > 0) {
+      control = model_.relaxed(at.command);
       at.active.contact[0] = contacts();
-      at.active.multiplier[0] = 2 * control[0] / one_[0].taken_slope;
+      at.active.multiplier[0] = model_.relaxed_push();
       at.active.count = 1;
     }
   std::fill(at.controls.begin(), at.controls.end(), control);
@@ -187,19 +127,19 @@ void Chain<Model>::measure_gaps(double slack) {
   near_.clear();
   double drift = 0;
   for (int i = 0; i <= n; ++i) {
-    const double dx = nodes_[i][0] - origin_[i][0], dy = nodes_[i][1] - origin_[i][1];
-    drift = std::max(drift, dx * dx + dy * dy);
+    const Position motion = minus(nodes_[i], origin_[i]);
+    drift = std::max(drift, dot(motion, motion));
   }
   drift_ = std::sqrt(drift);
   for (int j = 0; j < static_cast<int>(obstacles_.size()); ++j) {
     if (far(j, 0)) continue;
     const Obstacle& obstacle = obstacles_[j];
-    const Position moved = mount_of_[j] < 0 ? Position{} : displacements_[mount_of_[j]];
+    const Position moved = this->moved(j);
     const int first = j * robot_.points();
     for (int i = 0; i <= n; ++i) {
       const double distance = clearance_beyond(obstacle, minus(nodes_[i], moved), reach_);
       if (distance > 0) {
-        i += static_cast<int>(std::min(distance / length_, static_cast<double>(n)));
+        i += static_cast<int>(std::min(distance / model_.segment_length(), static_cast<double>(n)));
         continue;
       }
       for (int start = i * stride; start < robot_.points(); start += robot_.positions())
@@ -219,8 +159,7 @@ void Chain<Model>::measure_gaps(double slack) {
 template <class Model>
 void Chain<Model>::survey(double* gaps) const {
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
-    const Position moved = mount_of_[j] < 0 ? Position{} : displacements_[mount_of_[j]];
-    ccr::measure_gaps(obstacles_[j], points_, moved, gaps);
+    ccr::measure_gaps(obstacles_[j], std::span<const Position>(points_), moved(static_cast<int>(j)), gaps);
     for (std::size_t k = 0; k < points_.size() && !obstacles_[j].everywhere; ++k)
       if (!obstacles_[j].touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
     gaps += points_.size();
@@ -228,14 +167,14 @@ void Chain<Model>::survey(double* gaps) const {
 }
 
 template <class Model>
-Position Chain<Model>::point(int contact) const {
+Chain<Model>::Position Chain<Model>::point(int contact) const {
   const int mount = this->mount(contact);
   const Position& point = points_[contact % points_.size()];
   return mount < 0 ? point : minus(point, displacements_[mount]);
 }
 
 template <class Model>
-Gap Chain<Model>::gap(int contact) const {
+Gap<Chain<Model>::kSpace> Chain<Model>::gap(int contact) const {
   return measure_gap(obstacle(contact), point(contact));
 }
 
@@ -243,28 +182,30 @@ template <class Model>
 Chain<Model>::Slope Chain<Model>::slope(int contact) const {
   if constexpr (Model::kSliding)
     if (contact == contacts()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
-  const Gap gap = this->gap(contact);
-  const Position normal = {{gap.x, gap.y}};
+  const Position normal = gap(contact).slope;
   return {force(contact, normal), mount(contact), normal};
 }
 
 template <class Model>
 Chain<Model>::Force Chain<Model>::force(int contact, const Position& on_point) const {
   const Site& site = this->site(contact);
-  const auto share = [&](double weight, const Position& lever) {
-    const double turn = site.lever * (on_point[1] * lever[0] - on_point[0] * lever[1]);
-    return State{{weight * on_point[0], weight * on_point[1], weight * turn}};
+  const auto share = [&](double weight, int node) {
+    State share{};
+    const auto turn = moment(lever(site, node), on_point);
+    for (int k = 0; k < kSpace; ++k) share[k] = weight * on_point[k];
+    for (int k = 0; k < Model::kTurn; ++k) share[kSpace + k] = weight * turn[k];
+    return share;
   };
   const double t = site.fraction;
-  if (t == 0) return {site.node, false, share(1, levers_[site.node]), {}};
-  return {site.node, true, share(1 - t, levers_[site.node]), share(t, levers_[site.node + 1])};
+  if (t == 0) return {site.node, false, share(1, site.node), {}};
+  return {site.node, true, share(1 - t, site.node), share(t, site.node + 1)};
 }
 
 template <class Model>
 double Chain<Model>::lever_arm(int contact) const {
   if (contact == contacts()) return robot_.offset * robot_.segments;
   const Site& site = this->site(contact);
-  return length_ * (site.node + (site.fraction > 0));
+  return model_.segment_length() * (site.node + (site.fraction > 0));
 }
 
 template <class Model>
@@ -281,9 +222,8 @@ double Chain<Model>::violation() const {
 
 template <class Model>
 double Chain<Model>::tolerance() const {
-  const double free = pull_ / robot_.offset;  // angle of a segment that nothing touches
-  const double scale = Model::kSliding ? steepest_ : free * free;
-  return limits::kStationarity * scale + limits::kRoundoff * steepest_;
+  const double scale = Model::kSliding ? model_.steepest : model_.free_turn() * model_.free_turn();
+  return limits::kStationarity * scale + limits::kRoundoff * model_.steepest;
 }
 
 template <class Model>
@@ -293,137 +233,80 @@ void Chain<Model>::reduced_gradient(const ActiveSet& active) {
   for (int j = 0; j < active.count; ++j) {
     const auto& [force, mount, normal] = slope(active.contact[j]);
     if (mount >= 0)
-      for (int k = 0; k < 2; ++k) mount_gradient_[mount][k] += active.multiplier[j] * normal[k];
-    for (int k = 0; k < Model::kState; ++k) {
+      for (int k = 0; k < kSpace; ++k) mount_gradient_[mount][k] += active.multiplier[j] * normal[k];
+    for (int k = 0; k < kState; ++k) {
       pulls_[force.node][k] += active.multiplier[j] * force.here[k];
       if (force.split) pulls_[force.node + 1][k] += active.multiplier[j] * force.next[k];
     }
   }
-  State p;
-  for (int i = robot_.segments - 1; i >= 0; --i) {
-    const auto bend = bends_[i];
-    p -= pulls_[i + 1];
-    adjoints_[i] = p;
-    const double turn = moment(p, bend);
-    gradient_[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
-    if constexpr (Model::kSliding) gradient_[i][0] += p[3] * bend.taken_slope - inward(p, bend) * bend.stretch;
-    p[2] += turn;
-  }
+  model_.adjoin(pulls_);
 }
 
 template <class Model>
 void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
-  for (int i = 0; i < robot_.segments; ++i) {
-    const auto bend = bends_[i];
-    const State& p = adjoints_[i];
-    const double turn = moment(p, bend), inward = ccr::inward(p, bend), heading = bend.heading_slope;
-    typename System::Stage& stage = system.stages[i];
-    stage.a = {-bend.dy, bend.dx};
-    stage.b[0] = -bend.dy * heading;
-    stage.b[1] = bend.dx * heading;
-    stage.b[2] = -bend.slope;
-    system.node_hessian[i] = {};
-    system.node_hessian[i](2, 2) = inward;
-    stage.hux = {{0, 0, inward * heading}};
-    stage.huu = {{2 * (bend.slope * bend.slope + bend.angle * bend.curvature) + inward * heading * heading +
-                  turn * bend.heading_curvature - p[2] * bend.curvature}};
-    if constexpr (Model::kSliding) {
-      stage.b[0] += bend.dx * bend.stretch;
-      stage.b[1] += bend.dy * bend.stretch;
-      stage.b[3] = bend.taken_slope;
-      stage.hux[2] += turn * bend.stretch;
-      stage.huu[0] += p[3] * bend.taken_curvature + 2 * turn * bend.stretch * heading - inward * bend.stretch_slope;
-    }
-  }
-  system.node_hessian[robot_.segments] = {};
+  model_.curvature(system);
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     if (contact == contacts()) continue;  // linear in the state
-    const Gap gap = this->gap(contact);
+    const Gap<kSpace> gap = this->gap(contact);
     const Site& site = this->site(contact);
+    const double scale = -active.multiplier[j];
     // Its Hessian in the states of the nodes beside it: J_aᵀ C J_b, and the curvature of the turn of each lever.
-    const auto motion = [&](double weight, const Position& lever) {
-      Mat<2, Model::kState> slope;
-      slope(0, 0) = slope(1, 1) = weight;
-      slope(0, 2) = -weight * site.lever * lever[1];
-      slope(1, 2) = weight * site.lever * lever[0];
+    const auto motion = [&](double weight, int node) {
+      Mat<kSpace, kState> slope;
+      const auto turn = swing(lever(site, node));
+      for (int r = 0; r < kSpace; ++r) {
+        slope(r, r) = weight;
+        for (int k = 0; k < Model::kTurn; ++k) slope(r, kSpace + k) = weight * turn(r, k);
+      }
       return slope;
     };
-    const auto turn = [&](double weight, const Position& lever) {
-      return weight * site.lever * (gap.x * lever[0] + gap.y * lever[1]);
+    const auto add_turn = [&](double weight, int node) {
+      const auto turn = bow(lever(site, node), gap.slope);
+      for (int r = 0; r < Model::kTurn; ++r)
+        for (int k = 0; k < Model::kTurn; ++k)
+          system.node_hessian[node](kSpace + r, kSpace + k) += scale * weight * turn(r, k);
     };
-    const double t = site.fraction, force = -active.multiplier[j];
-    const Mat<2, 2> c = {{force * gap.xx, force * gap.xy, force * gap.xy, force * gap.yy}};
-    const auto here = motion(1 - t, levers_[site.node]);
-    system.node_hessian[site.node] += transpose_times(here, times(c, here));
-    system.node_hessian[site.node](2, 2) -= force * turn(1 - t, levers_[site.node]);
+    const double t = site.fraction;
+    const int node = site.node;
+    const Mat<kSpace, kSpace> c = gap.curvature(scale);
+    const auto here = motion(1 - t, node);
+    system.node_hessian[node] += transpose_times(here, times(c, here));
+    add_turn(1 - t, node);
     if (t == 0) continue;
-    const auto next = motion(t, levers_[site.node + 1]);
-    system.node_hessian[site.node + 1] += transpose_times(next, times(c, next));
-    system.node_hessian[site.node + 1](2, 2) -= force * turn(t, levers_[site.node + 1]);
-    system.couple(site.node, transpose_times(here, times(c, next)));
+    const auto next = motion(t, node + 1);
+    system.node_hessian[node + 1] += transpose_times(next, times(c, next));
+    add_turn(t, node + 1);
+    system.couple(node, transpose_times(here, times(c, next)));
   }
 }
 
 template <class Model>
-double Chain<Model>::tension(const ActiveSet& active) const {
-  double slope = 0;  // of the energy in the cable displacement, over the stiffness
-  if constexpr (Model::kSliding) {
+Chain<Model>::Tensions Chain<Model>::tensions(const ActiveSet& active) const {
+  Tensions tensions = model_.pull_slopes();
+  if constexpr (Model::kSliding)
     for (int j = 0; j < active.count; ++j)
-      if (active.contact[j] == contacts()) slope = active.multiplier[j];
-    return stiffness() * slope;
-  } else {
-    for (int i = 0; i < robot_.segments; ++i) {
-      const auto bend = bends_[i];
-      const State& p = adjoints_[i];
-      slope += bend.pull_slope * (2 * bend.angle - moment(p, bend) / 2 - p[2]);
-    }
-    return stiffness() * (slope / robot_.segments);
-  }
+      if (active.contact[j] == contacts()) tensions[0] = active.multiplier[j];
+  for (double& tension : tensions.v) tension *= stiffness();
+  return tensions;
 }
 
 template <class Model>
-Position Chain<Model>::push(const ActiveSet& active, int obstacle) const {
+Chain<Model>::Position Chain<Model>::push(const ActiveSet& active, int obstacle) const {
   Position force{};
   for (int j = 0; j < active.count; ++j) {
     if (active.contact[j] == contacts() || active.contact[j] / static_cast<int>(points_.size()) != obstacle) continue;
-    const Gap gap = this->gap(active.contact[j]);
-    force[0] += stiffness() * active.multiplier[j] * gap.x;
-    force[1] += stiffness() * active.multiplier[j] * gap.y;
+    const Gap<kSpace> gap = this->gap(active.contact[j]);
+    for (int k = 0; k < kSpace; ++k) force[k] += stiffness() * active.multiplier[j] * gap.slope[k];
   }
   return force;
 }
 
-// All segments have the same shape: the sums over their directions (i + 1/2) θ are taken by turning one of them on.
-template <class Model>
-Vec<3> Chain<Model>::free_slopes(const Command& command) {
-  const int n = robot_.segments;
-  const double length = command.length / n;
-  relaxed(command);
-  const auto bend = one_[0];
-  double turn, stretch = 0;  // slopes of the angle and of the logarithm of the chord
-  if constexpr (Model::kSliding) {
-    turn = 1 / (n * bend.taken_slope);
-    stretch = bend.stretch * turn;
-  } else {
-    turn = bend.pull_slope / n;
-  }
-  const double chord = length * std::sqrt(bend.forward * bend.forward + bend.sideways * bend.sideways);
-  double cosine = std::cos(bend.angle / 2), sine = std::sin(bend.angle / 2);
-  Vec<3> slopes{};
-  for (int i = 0; i < n; ++i) {
-    const double swing = (i + 0.5) * turn;
-    slopes[0] += chord * (stretch * sine + swing * cosine);
-    slopes[1] += chord * (stretch * cosine - swing * sine);
-    const double next = cosine * bend.cosine - sine * bend.sine;
-    sine = sine * bend.cosine + cosine * bend.sine;
-    cosine = next;
-  }
-  slopes[2] = -n * turn;
-  return slopes;
-}
-
-template class Chain<UniformCable>;
-template class Chain<SlidingCable>;
+#define CCR_INSTANTIATE(Model)                                                                                   \
+  template class Chain<Model>;                                                                                   \
+  template void place_points<Model>(const Robot&, std::span<const Position<Model::kSpace>>,                      \
+                                    std::span<const Model::Frame>, std::vector<Position<Model::kSpace>>&);
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
 
 }  // namespace ccr

@@ -5,6 +5,8 @@
 #include <limits>
 #include <span>
 
+#include "models.hpp"
+
 namespace ccr {
 
 using namespace limits;
@@ -153,10 +155,18 @@ bool Contacts<Model>::admit(const Chain& chain, Hessian& hessian, int contact, A
 template <class Model>
 int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const {
   double reach = 0;  // of any point under the step
-  for (const State<Model>& d : step.states)
-    reach = std::max(reach, std::abs(d[0]) + std::abs(d[1]) + chain.robot().offset * std::abs(d[2]));
+  for (const auto& d : step.states) {
+    double motion = 0, turn = 0;
+    for (int k = 0; k < Model::kSpace; ++k) motion += std::abs(d[k]);
+    for (int k = 0; k < Model::kTurn; ++k) turn += std::abs(d[Model::kSpace + k]);
+    reach = std::max(reach, motion + chain.robot().offset * turn);
+  }
   double shift = 0;  // of any mount
-  for (const Position& d : step.mounts) shift = std::max(shift, std::abs(d[0]) + std::abs(d[1]));
+  for (const auto& d : step.mounts) {
+    double motion = 0;
+    for (const double part : d.v) motion += std::abs(part);
+    shift = std::max(shift, motion);
+  }
   reach += shift;
   int worst = -1;
   double lowest = -kFeasibility / 2;
@@ -215,7 +225,8 @@ bool Contacts<Model>::correct(const Chain& chain, Hessian& hessian, ActiveSet& a
   return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
 }
 
-template class Contacts<UniformCable>;
-template class Contacts<SlidingCable>;
+#define CCR_INSTANTIATE(Model) template class Contacts<Model>;
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
 
 }  // namespace ccr

@@ -3,24 +3,27 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models.hpp"
+
 namespace ccr {
 
 using namespace limits;
 
 template <class Model>
 void Direction<Model>::clear() {
-  std::fill(controls.begin(), controls.end(), Control{});
-  std::fill(states.begin(), states.end(), State<Model>{});
-  std::fill(mounts.begin(), mounts.end(), Position{});
+  std::fill(controls.begin(), controls.end(), typename Model::Control{});
+  std::fill(states.begin(), states.end(), typename Model::State{});
+  std::fill(mounts.begin(), mounts.end(), Position<Model::kSpace>{});
 }
 
 template <class Model>
 void Direction<Model>::add(double scale, const Direction& other) {
-  for (std::size_t i = 0; i < controls.size(); ++i) controls[i][0] += scale * other.controls[i][0];
+  for (std::size_t i = 0; i < controls.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k) controls[i][k] += scale * other.controls[i][k];
   for (std::size_t i = 0; i < states.size(); ++i)
     for (int k = 0; k < Model::kState; ++k) states[i][k] += scale * other.states[i][k];
   for (std::size_t m = 0; m < other.mounts.size(); ++m)
-    for (int k = 0; k < 2; ++k) mounts[m][k] += scale * other.mounts[m][k];
+    for (int k = 0; k < Model::kSpace; ++k) mounts[m][k] += scale * other.mounts[m][k];
 }
 
 template <class Model>
@@ -29,9 +32,9 @@ Hessian<Model>::Hessian(int segments, int mounts)
       penalty_(kMaxActive),
       mount_hessian_(mounts),
       mount_factor_(mounts),
-      columns_(2 * mounts, Column{0, 0, {}, Direction(segments, 0)}),
-      schur_(4 * mounts * mounts),
-      moves_(2 * mounts),
+      columns_(kSpace * mounts, Column{0, 0, {}, Direction(segments, 0)}),
+      schur_(kSpace * kSpace * mounts * mounts),
+      moves_(kSpace * mounts),
       loads_(System::kMaxLoads) {
   for (Column& column : columns_) column.forces.reserve(kMaxActive);
 }
@@ -52,7 +55,8 @@ template <class Model>
 void Hessian<Model>::shape(const Chain& chain, const ActiveSet& active, double strength) {
   chain.curvature(active, system_);
   steepest_ = 0;
-  for (const auto& stage : system_.stages) steepest_ = std::max(steepest_, std::abs(stage.huu[0]));
+  for (const auto& stage : system_.stages)
+    for (int k = 0; k < Model::kShears; ++k) steepest_ = std::max(steepest_, std::abs(stage.huu(k, k)));
   for (int j = 0; j < active.count; ++j) {
     const Force slope = chain.slope(active.contact[j]).force;
     const double arm = chain.lever_arm(active.contact[j]);
@@ -77,22 +81,24 @@ void Hessian<Model>::shape_mounts(const Chain& chain, const ActiveSet& active) {
     const int mount = chain.mount(active.contact[j]);
     if (mount < 0) continue;
     int first = 0;
-    while (first < touched_ && columns_[first].mount != mount) first += 2;
+    while (first < touched_ && columns_[first].mount != mount) first += kSpace;
     if (first == touched_) {
-      touched_ += 2;
-      for (int k = 0; k < 2; ++k) {
+      touched_ += kSpace;
+      for (int k = 0; k < kSpace; ++k) {
         columns_[first + k].mount = mount;
         columns_[first + k].axis = k;
         columns_[first + k].forces.clear();
       }
     }
-    const Gap gap = chain.gap(active.contact[j]);
-    const double push = active.multiplier[j];
-    Mat<2, 2> stiffening = {{push * gap.xx, push * gap.xy, push * gap.xy, push * gap.yy}};
-    stiffening -= outer(penalty_[j], Position{{gap.x, gap.y}}, Position{{gap.x, gap.y}});
+    const Gap<kSpace> gap = chain.gap(active.contact[j]);
+    Mat<kSpace, kSpace> stiffening = gap.curvature(active.multiplier[j]);
+    stiffening -= outer(penalty_[j], gap.slope, gap.slope);
     mount_hessian_[mount] -= stiffening;
-    for (int k = 0; k < 2; ++k)
-      columns_[first + k].forces.push_back(chain.force(active.contact[j], {{stiffening(0, k), stiffening(1, k)}}));
+    for (int k = 0; k < kSpace; ++k) {
+      Position<kSpace> column;
+      for (int r = 0; r < kSpace; ++r) column[r] = stiffening(r, k);
+      columns_[first + k].forces.push_back(chain.force(active.contact[j], column));
+    }
   }
 }
 
@@ -105,7 +111,7 @@ template <class Model>
 bool Hessian<Model>::factor_mounts(double damping) {
   for (std::size_t m = 0; m < mount_hessian_.size(); ++m) {
     mount_factor_[m] = mount_hessian_[m];
-    for (int k = 0; k < 2; ++k) mount_factor_[m](k, k) += damping;
+    for (int k = 0; k < kSpace; ++k) mount_factor_[m](k, k) += damping;
   }
   for (int a = 0; a < touched_; ++a) {
     Column& column = columns_[a];
@@ -122,7 +128,7 @@ bool Hessian<Model>::factor_mounts(double damping) {
       if (a == b && !(entry > 0)) return false;
       schur_[a * touched_ + b] = a == b ? std::sqrt(entry) : entry / schur_[b * touched_ + b];
     }
-  for (Mat<2, 2>& factor : mount_factor_)
+  for (Mat<kSpace, kSpace>& factor : mount_factor_)
     if (!factorize(factor)) return false;
   return true;
 }
@@ -158,7 +164,7 @@ void Hessian<Model>::respond(const Chain& chain, std::span<const Load> loads) {
   system_.respond(std::span(loads_).first(loads.size()));
   if (mount_hessian_.empty()) return;
   for (const Load& load : loads) {
-    std::vector<Position>& mounts = load.response->mounts;
+    std::vector<Position<kSpace>>& mounts = load.response->mounts;
     for (std::size_t m = 0; m < mounts.size(); ++m) {
       mounts[m] = {};
       if (!load.gap) mounts[m] -= chain.mount_gradient()[m];
@@ -168,9 +174,10 @@ void Hessian<Model>::respond(const Chain& chain, std::span<const Load> loads) {
   }
 }
 
-template struct Direction<UniformCable>;
-template struct Direction<SlidingCable>;
-template class Hessian<UniformCable>;
-template class Hessian<SlidingCable>;
+#define CCR_INSTANTIATE(Model)     \
+  template struct Direction<Model>; \
+  template class Hessian<Model>;
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
 
 }  // namespace ccr

@@ -12,9 +12,9 @@ namespace ccr {
 template <class Model>
 struct Direction {
   Direction(int segments, int mounts) : controls(segments), states(segments + 1), mounts(mounts) {}
-  std::vector<Control> controls;
-  std::vector<State<Model>> states;
-  std::vector<Position> mounts;
+  std::vector<typename Model::Control> controls;
+  std::vector<typename Model::State> states;
+  std::vector<Position<Model::kSpace>> mounts;
 
   void clear();
   void add(double scale, const Direction& other);
@@ -46,10 +46,11 @@ class Hessian {
   double steepest() const { return steepest_; }        // largest curvature of a control
 
  private:
-  using System = ccr::System<Model>;
+  static constexpr int kSpace = Model::kSpace;
+  using System = typename Model::System;
   using Force = typename System::Force;
 
-  // One of the two directions a touched mount can move in: the forces that puts on the chain, and its response.
+  // One of the directions a touched mount can move in: the forces that puts on the chain, and its response.
   struct Column {
     int mount, axis;
     std::vector<Force> forces;
@@ -62,7 +63,7 @@ class Hessian {
 
   System system_;
   std::vector<double> penalty_;
-  std::vector<Mat<2, 2>> mount_hessian_, mount_factor_;  // of each mount by itself
+  std::vector<Mat<kSpace, kSpace>> mount_hessian_, mount_factor_;  // of each mount by itself
   std::vector<Column> columns_;
   int touched_ = 0;             // columns in use
   std::vector<double> schur_;   // Cholesky factor, (touched, touched)

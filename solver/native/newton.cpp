@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models.hpp"
+
 namespace ccr {
 
 using namespace limits;
@@ -18,7 +20,7 @@ Newton<Model>::Newton(const Robot& robot, int obstacles)
 }
 
 template <class Model>
-void Newton<Model>::enter(std::span<const Obstacle> obstacles) {
+void Newton<Model>::enter(std::span<const Obstacle<Model::kSpace>> obstacles) {
   chain.enter(obstacles);
   const int segments = chain.robot().segments, mounts = chain.mounts();
   if (step_.mounts.size() == static_cast<std::size_t>(mounts)) return;
@@ -31,9 +33,10 @@ void Newton<Model>::enter(std::span<const Obstacle> obstacles) {
 template <class Model>
 bool Newton<Model>::equilibrium(const ActiveSet& active) const {
   double worst = 0;
-  for (const Control& g : chain.gradient()) worst = std::max(worst, std::abs(g[0]));
+  for (const auto& g : chain.gradient())
+    for (const double slope : g.v) worst = std::max(worst, std::abs(slope));
   const double arm = chain.robot().max_length / chain.robot().segments;
-  for (const Position& g : chain.mount_gradient()) worst = std::max(worst, arm * norm(g));
+  for (const auto& g : chain.mount_gradient()) worst = std::max(worst, arm * norm(g));
   return worst <= chain.tolerance() && on_surface(active, kFeasibility);
 }
 
@@ -62,10 +65,12 @@ bool Newton<Model>::convexify(const ActiveSet& active) {
 template <class Model>
 double Newton<Model>::size(const Direction<Model>& step) const {
   double longest = 0;
-  for (const State<Model>& d : step.states) longest = std::max({longest, std::abs(d[0]), std::abs(d[1])});
+  for (const auto& d : step.states)
+    for (int k = 0; k < Model::kSpace; ++k) longest = std::max(longest, std::abs(d[k]));
   longest /= chain.robot().max_length;
-  for (const Position& d : step.mounts) longest = std::max(longest, norm(d) / chain.robot().max_length);
-  for (const Control& d : step.controls) longest = std::max(longest, std::abs(d[0]));
+  for (const auto& d : step.mounts) longest = std::max(longest, norm(d) / chain.robot().max_length);
+  for (const auto& d : step.controls)
+    for (const double part : d.v) longest = std::max(longest, std::abs(part));
   return longest;
 }
 
@@ -79,11 +84,11 @@ double Newton<Model>::merit(double weight) const {
 namespace {
 
 template <class Model>
-void advance(const Iterate& from, double scale, const Direction<Model>& step, Iterate& to) {
+void advance(const Iterate<Model>& from, double scale, const Direction<Model>& step, Iterate<Model>& to) {
   for (std::size_t i = 0; i < from.controls.size(); ++i)
-    to.controls[i][0] = from.controls[i][0] + scale * step.controls[i][0];
+    for (int k = 0; k < Model::kControl; ++k) to.controls[i][k] = from.controls[i][k] + scale * step.controls[i][k];
   for (std::size_t m = 0; m < from.mounts.size(); ++m)
-    for (int k = 0; k < 2; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
+    for (int k = 0; k < Model::kSpace; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
 }
 
 // Multipliers a fraction of the way from one set to another.
@@ -110,7 +115,7 @@ double Newton<Model>::search(const Iterate& at, const ActiveSet& target, double&
     return 0;
   }
   double slope = 0;  // of the energy along the step
-  for (std::size_t i = 0; i < step_.controls.size(); ++i) slope += chain.gradient()[i][0] * step_.controls[i][0];
+  for (std::size_t i = 0; i < step_.controls.size(); ++i) slope += dot(chain.gradient()[i], step_.controls[i]);
   for (std::size_t m = 0; m < step_.mounts.size(); ++m) slope += dot(chain.mount_gradient()[m], step_.mounts[m]);
   for (int j = 0; j < at.active.count; ++j)
     slope += at.active.multiplier[j] * chain.slope(at.active.contact[j]).along(step_);
@@ -236,7 +241,8 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   return verdict;
 }
 
-template class Newton<UniformCable>;
-template class Newton<SlidingCable>;
+#define CCR_INSTANTIATE(Model) template class Newton<Model>;
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
 
 }  // namespace ccr

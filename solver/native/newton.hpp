@@ -17,8 +17,10 @@ struct Verdict {
 template <class Model>
 class Newton {
  public:
+  using Iterate = ccr::Iterate<Model>;
+
   Newton(const Robot& robot, int obstacles);
-  void enter(std::span<const Obstacle> obstacles);
+  void enter(std::span<const Obstacle<Model::kSpace>> obstacles);
 
   // Iteration with an l1 merit search: quadratic, for a start close to a stable equilibrium. Gives up where the
   // curvature along the active gaps is not positive.

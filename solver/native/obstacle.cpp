@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "limits.hpp"
 
@@ -16,20 +15,32 @@ namespace {
 
 // Calls `function` with the law of the obstacle's shape, so that it is chosen once for many points.
 template <class Function>
-void with_law(const Obstacle& obstacle, Function function) {
+void with_law(const Obstacle<2>& obstacle, Function function) {
   switch (obstacle.shape) {
     case Shape::kCircle: return function(ccr_circle_gap);
     case Shape::kHalfPlane: return function(ccr_half_plane_gap);
     case Shape::kEllipse: return function(ccr_ellipse_gap);
     case Shape::kCapsule: return function(ccr_capsule_gap);
     case Shape::kPolygon: return function(ccr_polygon_gap);
-    case Shape::kCustom: return function(obstacle.law);
+    default: return function(obstacle.law);
   }
 }
 
-template <class Law>
-Gap evaluate(Law law, const Obstacle& obstacle, const Position& point) {
-  Gap gap;
+template <class Function>
+void with_law(const Obstacle<3>& obstacle, Function function) {
+  switch (obstacle.shape) {
+    case Shape::kSphere: return function(ccr_sphere_gap);
+    case Shape::kHalfSpace: return function(ccr_half_space_gap);
+    case Shape::kSpatialCapsule: return function(ccr_spatial_capsule_gap);
+    case Shape::kCylinder: return function(ccr_cylinder_gap);
+    case Shape::kBox: return function(ccr_box_gap);
+    default: return function(obstacle.law);
+  }
+}
+
+template <int D, class Law>
+Gap<D> evaluate(Law law, const Obstacle<D>& obstacle, const Position<D>& point) {
+  Gap<D> gap;
   const double* in[] = {point.v.data(), obstacle.parameters.data()};
   double* out[] = {&gap.value};
   law(in, out, nullptr, nullptr, 0);
@@ -38,46 +49,58 @@ Gap evaluate(Law law, const Obstacle& obstacle, const Position& point) {
 
 }  // namespace
 
-Gap measure_gap(const Obstacle& obstacle, const Position& point) {
-  Gap gap;
+template <int D>
+Gap<D> measure_gap(const Obstacle<D>& obstacle, const Position<D>& point) {
+  Gap<D> gap;
   with_law(obstacle, [&](auto law) { gap = evaluate(law, obstacle, point); });
   return gap;
 }
 
-void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, const Position& moved, double* gaps) {
+template <int D>
+void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> points, const Position<D>& moved,
+                  double* gaps) {
   with_law(obstacle, [&](auto law) {
     for (std::size_t k = 0; k < points.size(); ++k) gaps[k] = evaluate(law, obstacle, minus(points[k], moved)).value;
   });
 }
 
-double clearance(const Obstacle& obstacle, const Position& point) {
-  return clearance(obstacle, std::span(&point, 1));
-}
-
-double clearance(const Obstacle& obstacle, std::span<const Position> points) {
+template <int D>
+double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> points) {
   const int count = static_cast<int>(points.size());
-  if (obstacle.shape == Shape::kHalfPlane) {
-    const Position normal = {{obstacle.parameters[0], obstacle.parameters[1]}};
-    return lowest(count, [&](int k) { return dot(normal, points[k]); }) - obstacle.parameters[2];
+  if (obstacle.wall()) {
+    Position<D> normal;
+    std::copy_n(obstacle.parameters.begin(), D, normal.v.begin());
+    return lowest(count, [&](int k) { return dot(normal, points[k]); }) - obstacle.parameters[D];
   }
   const double square = lowest(count, [&](int k) {
-    const Position offset = minus(points[k], obstacle.center);
+    const Position<D> offset = minus(points[k], obstacle.center);
     return dot(offset, offset);
   });
   return std::sqrt(square) - obstacle.radius;
 }
 
-bool passes(const Obstacle& obstacle, const Position& from, const Position& to) {
-  const double dx = to[0] - from[0], dy = to[1] - from[1];
-  const double length = std::sqrt(dx * dx + dy * dy);
-  if (length <= limits::kSweepStride * obstacle.fineness || clearance(obstacle, from) > length) return true;
+template <int D>
+bool passes(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to) {
+  const Position<D> path = minus(to, from);
+  const double length = norm(path);
+  if (length <= limits::kSweepStride * obstacle.fineness || clearance(obstacle, std::span(&from, 1)) > length)
+    return true;
   const int pieces = static_cast<int>(std::ceil(length / (limits::kSweepStride * obstacle.fineness)));
   for (int k = 1; k < pieces; ++k) {
-    const double t = static_cast<double>(k) / pieces;
-    const Position between = {{from[0] + t * dx, from[1] + t * dy}};
+    Position<D> between = from;
+    for (int i = 0; i < D; ++i) between[i] += static_cast<double>(k) / pieces * path[i];
     if (measure_gap(obstacle, between).value < -limits::kSweepDepth * obstacle.fineness) return false;
   }
   return true;
 }
+
+#define CCR_INSTANTIATE(D)                                                                                            \
+  template Gap<D> measure_gap(const Obstacle<D>&, const Position<D>&);                                                \
+  template void measure_gaps(const Obstacle<D>&, std::span<const Position<D>>, const Position<D>&, double*);          \
+  template double clearance(const Obstacle<D>&, std::span<const Position<D>>);                                        \
+  template bool passes(const Obstacle<D>&, const Position<D>&, const Position<D>&);
+CCR_INSTANTIATE(2)
+CCR_INSTANTIATE(3)
+#undef CCR_INSTANTIATE
 
 }  // namespace ccr

@@ -2,57 +2,80 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <span>
 #include <vector>
 
-#include "linalg.hpp"
+#include "space.hpp"
 
 namespace ccr {
 
-using Position = Vec<2>;
-
-enum class Shape { kCircle, kHalfPlane, kEllipse, kCapsule, kPolygon, kCustom };  // in the order of SHAPES
+// Those of the plane, those of space, and compiled ones.
+enum class Shape {
+  kCircle, kHalfPlane, kEllipse, kCapsule, kPolygon, kSphere, kHalfSpace, kSpatialCapsule, kCylinder, kBox, kCustom
+};
+inline constexpr std::array kShapeNames = {"circle",     "half_plane",      "ellipse",  "capsule", "polygon", "sphere",
+                                           "half_space", "spatial_capsule", "cylinder", "box",     "custom"};
 
 // A compiled gap law: (point, parameters) to a Gap.
 using Law = int (*)(const double** in, double** out, int*, double*, int);
 
 inline constexpr int kShapeSize = 17;  // numbers of the largest shape
 
+template <int D>
 struct Obstacle {
   Shape shape;
   std::array<double, kShapeSize> parameters;  // as the gap law takes them
   Law law;                               // of a custom shape
-  Position center;                       // of a disc that holds it
-  double radius;                         // of that disc; infinite for a half-plane
-  double fineness;                       // smallest radius of its surface; infinite for a half-plane
+  Position<D> center;                    // of a ball that holds it
+  double radius;                         // of that ball; infinite for a wall
+  double fineness;                       // smallest radius of its surface; infinite for a wall
   std::vector<unsigned char> touchable;  // (lines, positions): whether a point can touch it
   bool everywhere;                       // whether all of them can
   bool mounted;                          // on a spring; fixed otherwise
-  Mat<2, 2> stiffness;                   // of its spring [N/mm]
+  Mat<D, D> stiffness;                   // of its spring [N/mm]
+
+  bool wall() const { return shape == Shape::kHalfPlane || shape == Shape::kHalfSpace; }
 };
 
+// A gap and its derivatives in the point.
+template <int D>
 struct Gap {
-  double value, x, y, xx, xy, yy;  // and its derivatives in the point
+  double value;
+  Position<D> slope;
+  std::array<double, D * (D + 1) / 2> upper;  // of the symmetric second derivative, row by row
+
+  Mat<D, D> curvature(double scale) const {
+    Mat<D, D> out;
+    for (int r = 0, k = 0; r < D; ++r)
+      for (int c = r; c < D; ++c, ++k) out(r, c) = out(c, r) = scale * upper[k];
+    return out;
+  }
 };
 
-Gap measure_gap(const Obstacle& obstacle, const Position& point);
+template <int D>
+Gap<D> measure_gap(const Obstacle<D>& obstacle, const Position<D>& point);
 
 // Gaps of several points to an obstacle that has moved, without their derivatives.
-void measure_gaps(const Obstacle& obstacle, std::span<const Position> points, const Position& moved, double* gaps);
+template <int D>
+void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> points, const Position<D>& moved,
+                  double* gaps);
 
-// A lower bound of the distance between a point, or the nearest of several, and the obstacle.
-double clearance(const Obstacle& obstacle, const Position& point);
-double clearance(const Obstacle& obstacle, std::span<const Position> points);
+// A lower bound of the distance between the nearest of several points and the obstacle.
+template <int D>
+double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> points);
 
 // How much farther than `reach` a point is at least, at most 0 when it is not.
-inline double clearance_beyond(const Obstacle& obstacle, const Position& point, double reach) {
-  if (obstacle.shape == Shape::kHalfPlane) return clearance(obstacle, point) - reach;
-  const double dx = point[0] - obstacle.center[0], dy = point[1] - obstacle.center[1];
-  const double square = dx * dx + dy * dy, within = obstacle.radius + reach;
+template <int D>
+double clearance_beyond(const Obstacle<D>& obstacle, const Position<D>& point, double reach) {
+  if (obstacle.wall()) return clearance(obstacle, std::span(&point, 1)) - reach;
+  const Position<D> offset = minus(point, obstacle.center);
+  const double square = dot(offset, offset), within = obstacle.radius + reach;
   return square <= within * within ? 0.0 : std::sqrt(square) - within;
 }
 
 // Whether the straight path from one point outside to another stays out of the obstacle, but for its very rim.
-bool passes(const Obstacle& obstacle, const Position& from, const Position& to);
+template <int D>
+bool passes(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to);
 
 }  // namespace ccr

@@ -15,7 +15,7 @@ namespace ccr {
 template <int NX, int NU, class Transition = Mat<NX, NX>>
 class Riccati {
  public:
-  static constexpr int kMaxLoads = std::max(limits::kMaxActive + 1, 2 * limits::kMaxObstacles);
+  static constexpr int kMaxLoads = std::max(limits::kMaxActive + 1, 3 * limits::kMaxObstacles);
 
   struct Stage {
     Transition a;

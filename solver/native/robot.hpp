@@ -1,0 +1,36 @@
+// What is the same for the models of a robot.
+#pragma once
+
+#include <vector>
+
+#include "space.hpp"
+
+namespace ccr {
+
+struct Robot {
+  bool sliding;
+  int segments;
+  double offset;       // cables from backbone [mm]
+  double angle;        // from the first cable to the second [rad]
+  double rigidity;     // EI [N mm^2]
+  double max_tension;  // [N]
+  double max_length;   // of the backbone [mm]
+  std::vector<Vec<2>> lines;  // place on the disk of each line of points that can touch [mm]
+  int between;                // points of a line between two nodes
+
+  int positions() const { return segments * (between + 1) + 1; }  // of a line
+  int points() const { return static_cast<int>(lines.size()) * positions(); }
+  double stiffness(double length) const { return rigidity * segments / (2 * length); }  // EI / 2 l0 [N mm]
+};
+
+template <int C>
+struct Command {
+  Vec<C> cables;  // displacements [mm]
+  double length;  // of the backbone [mm]
+
+  friend bool operator==(const Command& a, const Command& b) {
+    return a.cables.v == b.cables.v && a.length == b.length;
+  }
+};
+
+}  // namespace ccr

@@ -1,0 +1,173 @@
+#include "spatial.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limits.hpp"
+
+// The generated laws of a segment, inlined here.
+#define CASADI_SYMBOL_EXPORT static inline
+#include "spatial_laws.c"
+
+namespace ccr {
+
+Spatial::Spatial(const Robot& robot)
+    : states(robot.segments + 1),
+      frames(robot.segments + 1),
+      gradient(robot.segments),
+      robot_(robot),
+      controls_(robot.segments),
+      bendings_(robot.segments),
+      bends_(robot.segments),
+      forces_(robot.segments),
+      moments_(robot.segments) {}
+
+void Spatial::tell(const Command<2>& command) {
+  const double a = robot_.offset;
+  const double holes[2][2] = {{a, 0}, {a * std::cos(robot_.angle), a * std::sin(robot_.angle)}};
+  for (int k = 0; k < 2; ++k) {
+    const double side = command.cables[k] < 0 ? -1 : 1;
+    told_.pulls[k] = side * command.cables[k] / robot_.segments;
+    for (int c = 0; c < 2; ++c) told_.holes[2 * k + c] = side * holes[k][c];
+  }
+  told_.length = command.length / robot_.segments;
+}
+
+// The bending with which the cables have their lengths, by Newton's method from the straight segment.
+bool Spatial::close(const Control& control, Vec<2>& bending) const {
+  bending = {};
+  const double* in[] = {control.v.data(), bending.v.data(), told_.pulls.v.data(), &told_.length, told_.holes.data()};
+  for (int i = 0; i < limits::kClosureIterations; ++i) {
+    double law[6];
+    double* out[] = {law};
+    ccr_closure(in, out, nullptr, nullptr, 0);
+    const double determinant = law[2] * law[5] - law[3] * law[4];
+    const Vec<2> change = {{(law[3] * law[1] - law[5] * law[0]) / determinant, (law[4] * law[0] - law[2] * law[1]) / determinant}};
+    bending += change;
+    const double size = std::abs(change[0]) + std::abs(change[1]);
+    if (!(size < 2)) return false;
+    if (size <= limits::kClosed) return true;
+  }
+  return false;
+}
+
+bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& controls) {
+  tell(command);
+  controls_ = controls;
+  objective = steepest = 0;
+  states[0] = {};
+  frames[0] = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  for (int i = 0; i < robot_.segments; ++i) {
+    if (!close(controls[i], bendings_[i])) return false;
+    Bend& bend = bends_[i];
+    const double* in[] = {controls[i].v.data(), bendings_[i].v.data(), told_.pulls.v.data(), &told_.length, told_.holes.data()};
+    double* out[] = {bend.chord.v.data()};
+    ccr_bend(in, out, nullptr, nullptr, 0);
+    const Vec<3> chord = times(frames[i], bend.chord);
+    states[i + 1] = states[i];
+    for (int k = 0; k < 3; ++k) states[i + 1][k] += chord[k];
+    frames[i + 1] = times(frames[i], bend.rotation);
+    objective += bend.objective;
+    for (const double slope : bend.objective_slope.v) steepest = std::max(steepest, std::abs(slope));
+  }
+  return std::isfinite(objective);
+}
+
+void Spatial::adjoin(const std::vector<State>& pulls) {
+  Vec<3> force, moment;
+  for (int i = robot_.segments - 1; i >= 0; --i) {
+    const Bend& bend = bends_[i];
+    for (int k = 0; k < 3; ++k) {
+      force[k] -= pulls[i + 1][k];
+      moment[k] -= pulls[i + 1][3 + k];
+    }
+    forces_[i] = transpose_times(frames[i], force);
+    moments_[i] = transpose_times(frames[i], moment);
+    gradient[i] = bend.objective_slope;
+    gradient[i] += transpose_times(bend.chord_slope, forces_[i]);
+    gradient[i] += transpose_times(bend.turn_slope, moments_[i]);
+    moment += cross(times(frames[i], bend.chord), force);
+  }
+}
+
+void Spatial::curvature(System& system) const {
+  for (int i = 0; i < robot_.segments; ++i) {
+    const Bend& bend = bends_[i];
+    const Frame& frame = frames[i];
+    System::Stage& stage = system.stages[i];
+    stage.a.chord = times(frame, bend.chord);
+    const Mat<3, 3> chord_slope = times(frame, bend.chord_slope), turn_slope = times(frame, bend.turn_slope);
+    const Vec<3> force = times(frame, forces_[i]), moment = times(frame, moments_[i]);
+    const Mat<3, 3> turned = bow(stage.a.chord, force);
+    system.node_hessian[i] = {};
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) {
+        stage.b(r, c) = chord_slope(r, c);
+        stage.b(3 + r, c) = turn_slope(r, c);
+        system.node_hessian[i](3 + r, 3 + c) = turned(r, c);
+      }
+    stage.hux = {};
+    for (int k = 0; k < 3; ++k) {
+      const Vec<3> swung = cross({{chord_slope(0, k), chord_slope(1, k), chord_slope(2, k)}}, force);
+      const Vec<3> twisted = cross({{turn_slope(0, k), turn_slope(1, k), turn_slope(2, k)}}, moment);
+      for (int c = 0; c < 3; ++c) stage.hux(k, 3 + c) = swung[c] + twisted[c] / 2;
+    }
+    const double* in[] = {controls_[i].v.data(), bendings_[i].v.data(), told_.pulls.v.data(), &told_.length, told_.holes.data(),
+                          forces_[i].v.data(), moments_[i].v.data()};
+    double* out[] = {stage.huu.v.data()};
+    ccr_bow(in, out, nullptr, nullptr, 0);
+  }
+  system.node_hessian[robot_.segments] = {};
+}
+
+Vec<2> Spatial::pull_slopes() const {
+  Vec<2> slopes;
+  for (int i = 0; i < robot_.segments; ++i) {
+    const Bend& bend = bends_[i];
+    slopes += bend.objective_pull_slope;
+    slopes += transpose_times(bend.chord_pull_slope, forces_[i]);
+    slopes += transpose_times(bend.turn_pull_slope, moments_[i]);
+  }
+  for (double& slope : slopes.v) slope /= robot_.segments;
+  return slopes;
+}
+
+double Spatial::free_turn() const {
+  return (std::abs(told_.pulls[0]) + std::abs(told_.pulls[1])) / robot_.offset;
+}
+
+// All segments turn alike by θ, towards t with h·t = pull for both holes h and |t| = 2 sin θ/2, so that the middle of
+// segment i stands at the angle (i + 1/2) θ in the plane of t.
+Vec<10> Spatial::free_slopes(const Command<2>& command) const {
+  const int n = robot_.segments;
+  const double a = robot_.offset, length = command.length / n, cosine = std::cos(robot_.angle), sine = std::sin(robot_.angle);
+  // Slopes of t in each displacement, the same in all segments.
+  const double slopes[2][2] = {{1 / (n * a), -cosine / (n * a * sine)}, {0, 1 / (n * a * sine)}};
+  Vec<2> towards;
+  for (int k = 0; k < 2; ++k)
+    for (int c = 0; c < 2; ++c) towards[c] += command.cables[k] * slopes[k][c];
+  const double size = norm(towards), angle = 2 * std::asin(size / 2), rate = 1 / std::sqrt(1 - size * size / 4);
+  const double x = size > 0 ? towards[0] / size : 1, y = size > 0 ? towards[1] / size : 0;
+  double reach = 0, out = 0, fall = 0;  // of the tip in its plane, and their slopes in θ
+  for (int i = 0; i < n; ++i) {
+    const double middle = (i + 0.5) * angle;
+    reach += length * std::sin(middle);
+    out += length * (i + 0.5) * std::cos(middle);
+    fall -= length * (i + 0.5) * std::sin(middle);
+  }
+  const double sideways = size > 0 ? reach / size : out, swept = size > 0 ? n * angle / size : n;
+  Vec<10> tip;
+  for (int k = 0; k < 2; ++k) {
+    const double along = slopes[k][0] * x + slopes[k][1] * y, across = slopes[k][1] * x - slopes[k][0] * y;
+    const double turn = n * rate * along, swing = swept * across;  // of the tip in its plane, and of the plane
+    tip[5 * k] = out * rate * along * x - sideways * across * y;
+    tip[5 * k + 1] = out * rate * along * y + sideways * across * x;
+    tip[5 * k + 2] = fall * rate * along;
+    const double turn_x = turn * x - swing * y, turn_y = turn * y + swing * x;
+    tip[5 * k + 3] = turn_x;
+    tip[5 * k + 4] = turn_x * cosine + turn_y * sine;
+  }
+  return tip;
+}
+
+}  // namespace ccr

@@ -1,0 +1,287 @@
+"""Obstacles of space, validated once."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from solver.formulation import GapLaw
+from solver.obstacles import Extent, Obstacle, Place, direction, place
+from solver.robot import require_positive
+from solver.spatial.formulation import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpatialObstacle(Obstacle):
+    """A convex obstacle of space, fixed or on a spring; the attributes are those of :class:`solver.Obstacle`."""
+
+    space: ClassVar[int] = 3
+    places: ClassVar[tuple[str, ...]] = ("center",)  # fields that move with it
+
+    def __post_init__(self) -> None:
+        Obstacle.__post_init__(self)
+        for name in self.places:
+            object.__setattr__(self, name, place(name, getattr(self, name), 3))
+
+    def shifted(self, by: Iterable[float]) -> Self:
+        """The obstacle elsewhere."""
+        shift = np.array(list(by))
+        return replace(self, **{name: tuple((getattr(self, name) + shift).tolist()) for name in self.places})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sphere(SpatialObstacle):
+    """A ball.
+
+    Attributes:
+        center: Its centre (x, y, z) [mm].
+        radius: Its radius [mm].
+
+    Raises:
+        ValueError: If a value is not finite or the radius is not positive.
+    """
+
+    law: ClassVar[GapLaw] = SPHERE
+
+    center: Place
+    radius: float
+
+    def __post_init__(self) -> None:
+        SpatialObstacle.__post_init__(self)
+        require_positive("radius", self.radius)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(x, y, z, r)."""
+        return (*self.center, self.radius)
+
+    @property
+    def extent(self) -> Extent:
+        """The ball itself."""
+        return Extent(self.center, self.radius, 2 * self.radius, self.radius)
+
+    def outline(self) -> np.ndarray:
+        """Points of the sphere, ``(u, v, 3)`` [mm]."""
+        return self.center + self.radius * _ball(np.eye(3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HalfSpace(SpatialObstacle):
+    """A flat wall, or with ``nodes`` a load cell, which only the named nodes meet.
+
+    Attributes:
+        point: A point (x, y, z) of its surface [mm].
+        normal: Outward normal, from the wall towards the robot; normalised on construction.
+
+    Raises:
+        ValueError: If a value is not finite, or the normal vanishes.
+    """
+
+    law: ClassVar[GapLaw] = HALF_SPACE
+    places: ClassVar[tuple[str, ...]] = ("point",)
+
+    point: Place
+    normal: Place
+
+    def __post_init__(self) -> None:
+        SpatialObstacle.__post_init__(self)
+        object.__setattr__(self, "normal", direction("normal", self.normal, "from the wall towards the robot", 3))
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(nx, ny, nz, offset)."""
+        return (*self.normal, float(np.dot(self.normal, self.point)))
+
+    @property
+    def extent(self) -> Extent:
+        """Without bounds, and flat."""
+        return Extent(self.point, math.inf, math.inf, math.inf)
+
+    def outline(self) -> np.ndarray:
+        """Corners of a square of the surface around the point, 60 mm wide, ``(2, 2, 3)`` [mm]."""
+        _, first, second = _axes(np.array(self.normal))
+        sides = np.array([-30.0, 30.0])
+        return self.point + sides[:, None, None] * first + sides[None, :, None] * second
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capsule(SpatialObstacle):
+    """All points within a radius of a line: a rod, a rounded bar.
+
+    Attributes:
+        start: One end (x, y, z) of the line [mm].
+        end: Its other end [mm].
+        radius: The radius [mm].
+
+    Raises:
+        ValueError: If a value is not finite, the radius is not positive, or the ends coincide.
+    """
+
+    law: ClassVar[GapLaw] = CAPSULE
+    places: ClassVar[tuple[str, ...]] = ("start", "end")
+
+    start: Place
+    end: Place
+    radius: float
+
+    def __post_init__(self) -> None:
+        SpatialObstacle.__post_init__(self)
+        require_positive("radius", self.radius)
+        _check_ends(self.start, self.end)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(start, end, r)."""
+        return (*self.start, *self.end, self.radius)
+
+    @property
+    def extent(self) -> Extent:
+        """The ball about the middle of the line."""
+        center, half = _middle(self.start, self.end)
+        return Extent(center, half + self.radius, 2 * self.radius, self.radius)
+
+    def outline(self) -> np.ndarray:
+        """Points of its surface, ``(u, v, 3)`` [mm]."""
+        axis = np.subtract(self.end, self.start)
+        ball = _ball(_axes(axis / np.linalg.norm(axis)))
+        ends = np.where(ball @ axis > 0, 1.0, 0.0)[..., None]
+        return self.start + ends * axis + self.radius * ball
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cylinder(SpatialObstacle):
+    """A cylinder with rounded edges.
+
+    Attributes:
+        start: Middle (x, y, z) of one of its flat ends [mm].
+        end: Middle of the other [mm].
+        radius: Its radius [mm].
+        edge: Radius of its edges, at most ``radius`` and half its length [mm].
+
+    Raises:
+        ValueError: If a value is not finite or out of range, or the ends coincide.
+    """
+
+    law: ClassVar[GapLaw] = CYLINDER
+    places: ClassVar[tuple[str, ...]] = ("start", "end")
+
+    start: Place
+    end: Place
+    radius: float
+    edge: float = 1.0
+
+    def __post_init__(self) -> None:
+        SpatialObstacle.__post_init__(self)
+        require_positive("radius", self.radius)
+        require_positive("edge", self.edge)
+        _check_ends(self.start, self.end)
+        largest = min(self.radius, _middle(self.start, self.end)[1])
+        if self.edge > largest:
+            raise ValueError(f"edge is {self.edge}; it must be at most {largest:.6g} (radius and half-length)")
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(center, axis, radius and half-length of the core, edge radius)."""
+        center, half = _middle(self.start, self.end)
+        axis = np.subtract(self.end, self.start) / (2 * half)
+        return (*center, *axis.tolist(), self.radius - self.edge, half - self.edge, self.edge)
+
+    @property
+    def extent(self) -> Extent:
+        """The ball about its middle."""
+        center, half = _middle(self.start, self.end)
+        return Extent(center, math.hypot(half, self.radius), 2 * min(half, self.radius), self.edge)
+
+    def outline(self) -> np.ndarray:
+        """Points of its surface, ``(u, v, 3)`` [mm]."""
+        _, half = _middle(self.start, self.end)
+        axis, first, second = _axes(np.subtract(self.end, self.start) / (2 * half))
+        turns = np.linspace(0, 2 * math.pi, 33)
+        around = np.cos(turns)[:, None] * first + np.sin(turns)[:, None] * second
+        profile = ((0.0, 0.0), (0.0, self.radius), (2 * half, self.radius), (2 * half, 0.0))
+        return np.stack([self.start + along * axis + radius * around for along, radius in profile])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box(SpatialObstacle):
+    """A box with rounded edges.
+
+    Attributes:
+        center: Its centre (x, y, z) [mm].
+        sizes: Its sizes along its axes [mm].
+        edge: Radius of its edges and corners, at most half of the smallest size [mm].
+        axis: Direction of its first axis; normalised on construction.
+        second: Direction of its second axis, made perpendicular to the first.
+
+    Raises:
+        ValueError: If a value is not finite or out of range, or the axes do not span a plane.
+    """
+
+    law: ClassVar[GapLaw] = BOX
+
+    center: Place
+    sizes: Place
+    edge: float = 1.0
+    axis: Place = (1.0, 0.0, 0.0)
+    second: Place = (0.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        SpatialObstacle.__post_init__(self)
+        object.__setattr__(self, "sizes", place("sizes", self.sizes, 3))
+        for size in (*self.sizes, self.edge):
+            require_positive("a size or the edge", size)
+        if self.edge > min(self.sizes) / 2:
+            raise ValueError(f"edge is {self.edge}; it must be at most {min(self.sizes) / 2:.6g}, half the smallest size")
+        object.__setattr__(self, "axis", direction("axis", self.axis, "of the first axis", 3))
+        across = np.subtract(self.second, np.dot(self.second, self.axis) * np.array(self.axis))
+        object.__setattr__(self, "second", direction("second", across.tolist(), "of the second axis, not of the first", 3))
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Its axes, ``(3, 3)``, one in each row."""
+        return np.array([self.axis, self.second, np.cross(self.axis, self.second)])
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """(center, three axes, half-sizes of the core, edge radius)."""
+        return (*self.center, *self.axes.ravel().tolist(), *(size / 2 - self.edge for size in self.sizes), self.edge)
+
+    @property
+    def extent(self) -> Extent:
+        """The ball about its centre."""
+        return Extent(self.center, math.hypot(*self.sizes) / 2, min(self.sizes), self.edge)
+
+    def outline(self) -> np.ndarray:
+        """Points of its surface, ``(u, v, 3)`` [mm]."""
+        x, y, z = np.array(self.sizes) / 2
+        ring = np.array([[-x, -y], [x, -y], [x, y], [-x, y], [-x, -y]])
+        walls = [(0.0, -z), (1.0, -z), (1.0, z), (0.0, z)]
+        corners = np.array([[(*(scale * corner), height) for corner in ring] for scale, height in walls])
+        return self.center + corners @ self.axes
+
+
+def _check_ends(start: Place, end: Place) -> None:
+    if start == end:
+        raise ValueError(f"start and end are both {start}; they must differ")
+
+
+def _middle(start: Place, end: Place) -> tuple[Place, float]:
+    """Middle of a line, and half its length."""
+    return tuple((np.add(start, end) / 2).tolist()), math.dist(start, end) / 2
+
+
+def _axes(axis: np.ndarray) -> np.ndarray:
+    """A unit vector and two that stand on it, ``(3, 3)``."""
+    helper = np.eye(3)[np.abs(axis).argmin()]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return np.array([axis, first, np.cross(axis, first)])
+
+
+def _ball(axes: np.ndarray) -> np.ndarray:
+    """Unit vectors all around, ``(u, v, 3)``, from one end of the first axis to the other."""
+    down, turns = np.meshgrid(np.linspace(0, math.pi, 18), np.linspace(0, 2 * math.pi, 33), indexing="ij")
+    parts = np.stack([np.cos(down), np.sin(down) * np.cos(turns), np.sin(down) * np.sin(turns)], axis=-1)
+    return np.asarray(parts @ axes)

@@ -1,0 +1,127 @@
+"""The robot in space: what the solver needs to know of it, validated once."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.robot import require_positive
+
+LINES = ("backbone", "holes", "rim")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpatialRobot:
+    """A cable-driven continuum robot in space, clamped at the origin and pointing along +z.
+
+    Two pairs of cables run through its disks: the first cable at the angle 0 from +x, the second at ``angle``, and one
+    opposite to each. A displacement is that of the first cable of a pair where it is positive, that of its opposite where
+    it is negative; the other cable of the pair is slack and binds nothing.
+
+    Attributes:
+        length_mm: Length of the backbone, L0 [mm].
+        segments: Number of segments n; nodes are 0 (clamped) to n.
+        offset_mm: Distance a of the cables from the backbone [mm].
+        angle: From the first cable to the second, about +z [rad]; neither 0 nor half a turn.
+        rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tensions, never the shape.
+        max_tension: Tension the motor of a cable can hold [N]; ``math.inf`` lifts the limit.
+        max_cable_mm: Largest displacement of a cable [mm]; ``None`` stands for π·a / 2, a quarter turn of the tip.
+        touch: The lines whose points can touch obstacles: ``"backbone"``, ``"holes"`` (of all four cables), and
+            ``"rim"``, points of the edge of the disks.
+        rim_points: How many points the rim has, evenly around from +x.
+        between: Number of points of each line, evenly spaced between every two nodes, that can touch as well.
+
+    Raises:
+        ValueError: If a value is not finite, not positive, or out of range; the message names the bound.
+    """
+
+    length_mm: float
+    segments: int
+    offset_mm: float
+    angle: float = math.pi / 2
+    rigidity: float = 5000.0
+    max_tension: float = 15.0
+    max_cable_mm: float | None = None
+    touch: tuple[str, ...] = ("backbone", "holes")
+    rim_points: int = 16
+    between: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("length_mm", "offset_mm", "rigidity"):
+            require_positive(name, getattr(self, name))
+        if not (isinstance(self.segments, int) and 2 <= self.segments <= 4096):
+            raise ValueError(f"segments is {self.segments!r}; it must be a whole number from 2 to 4096")
+        if not (math.isfinite(self.angle) and abs(math.sin(self.angle)) > 0.1):
+            raise ValueError(f"angle is {self.angle}; the cables must not be near one plane with the backbone")
+        if not self.max_tension > 0:
+            raise ValueError(f"max_tension is {self.max_tension}; it must be positive (math.inf lifts the limit)")
+        object.__setattr__(self, "touch", tuple(self.touch))
+        if not self.touch or len(set(self.touch)) != len(self.touch) or not set(self.touch) <= set(LINES):
+            raise ValueError(f"touch is {self.touch}; it must name some of {LINES}, each once")
+        if not (isinstance(self.rim_points, int) and 3 <= self.rim_points <= 64):
+            raise ValueError(f"rim_points is {self.rim_points!r}; it must be a whole number from 3 to 64")
+        if not (isinstance(self.between, int) and 0 <= self.between <= 256):
+            raise ValueError(f"between is {self.between!r}; it must be a whole number from 0 to 256")
+        if self.max_cable_mm is None:
+            object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, self.length_mm) / 2)
+        require_positive("max_cable_mm", self.max_cable_mm)
+        bound = min(self.length_mm, self.segments * self.offset_mm * abs(math.sin(self.angle)))
+        if not self.cable_limit_mm < bound:
+            raise ValueError(f"max_cable_mm is {self.max_cable_mm}; it must be below {bound:.6g}")
+
+    @classmethod
+    def prototype(
+        cls, *, segments: int = 18, angle: float = math.pi / 2, max_tension: float = 15.0
+    ) -> "SpatialRobot":
+        """The paper's prototype, with a second cable; of its rigidity see :meth:`solver.Robot.prototype`."""
+        return cls(length_mm=180.0, segments=segments, offset_mm=8.0, angle=angle, max_tension=max_tension)
+
+    @property
+    def cable_limit_mm(self) -> float:
+        """``max_cable_mm`` with its default filled in [mm]."""
+        assert self.max_cable_mm is not None
+        return self.max_cable_mm
+
+    @property
+    def holes(self) -> np.ndarray:
+        """First and second hole of the base disk, ``(2, 3)`` [mm]."""
+        turned = self.offset_mm * np.array([math.cos(self.angle), math.sin(self.angle), 0.0])
+        return np.array([[self.offset_mm, 0.0, 0.0], turned])
+
+    @property
+    def lines_mm(self) -> np.ndarray:
+        """Place on the disk of the lines of ``touch``, ``(p, 2)`` [mm]."""
+        first, second = self.holes[:, :2]
+        turns = 2 * math.pi / self.rim_points * np.arange(self.rim_points)
+        places = {
+            "backbone": np.zeros((1, 2)),
+            "holes": np.array([first, second, -first, -second]),
+            "rim": self.offset_mm * np.column_stack([np.cos(turns), np.sin(turns)]),
+        }
+        return np.concatenate([places[line] for line in self.touch])
+
+    @property
+    def line_weights(self) -> np.ndarray:
+        """The same as multiples of both holes, ``(p, 2)``."""
+        return np.asarray(np.linalg.solve(self.holes[:, :2].T, self.lines_mm.T).T)
+
+    @property
+    def lines(self) -> int:
+        """Number of lines of points."""
+        counts = {"backbone": 1, "holes": 4, "rim": self.rim_points}
+        return sum(counts[line] for line in self.touch)
+
+    @property
+    def positions(self) -> int:
+        """Number of points of a line that can touch, node 0 included."""
+        return self.segments * (self.between + 1) + 1
+
+    @property
+    def spacing_mm(self) -> float:
+        """Distance between neighbouring points of the backbone that can touch [mm]."""
+        return self.length_mm / self.segments / (self.between + 1)
+
+    @property
+    def stiffness(self) -> float:
+        """B = EI / 2 l0 [N·mm], which turns the objective [rad²] into energy."""
+        return self.rigidity * self.segments / (2 * self.length_mm)

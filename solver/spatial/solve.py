@@ -1,0 +1,147 @@
+"""The solver in space: one robot in one scene, or many side by side."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from solver import _kernel
+from solver.batch import BaseBatch
+from solver.layout import SPACE, Layout, Model
+from solver.scene import Scene
+from solver.solve import check_clear, check_origin, check_width, scene_arrays
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout
+from solver.spatial.robot import SpatialRobot
+from solver.status import Status
+
+
+class SpatialSolver:
+    """Follows the equilibria of a robot among obstacles in space as its cables are pulled and released (eq. 13).
+
+    The equilibrium reached depends on the way there, so the present one is an argument of every step and the solver
+    keeps none.
+
+    Args:
+        robot: The robot.
+        scene: The obstacles, of :mod:`solver.spatial`.
+
+    Raises:
+        ValueError: If an obstacle is one of the plane, overlaps the straight robot, is narrow enough to slip between its
+            points, or names a node the robot does not have.
+    """
+
+    def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
+        self.robot, self.scene = robot, scene
+        check_space(scene)
+        check_width(robot, scene)
+        self._kernel = _kernel.SpatialKernel(kernel_robot(robot), kernel_scene(robot, scene))
+        straight = np.zeros(self._kernel.block_size)
+        straight[spatial_layout(robot, len(scene)).length_at] = robot.length_mm
+        self._rest = self._follow(straight, np.zeros(2))
+        check_clear(self._rest)
+
+    def rest(self) -> SpatialEquilibrium:
+        """The straight, unactuated robot."""
+        return self._rest
+
+    def step(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> SpatialEquilibrium:
+        """Move both pairs of cables evenly to displacements, as far as tension and obstacles allow.
+
+        A cable whose tension reaches the limit stops there, and the other goes on by itself.
+
+        Args:
+            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
+            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign tells which of its cables
+                is pulled.
+
+        Returns:
+            The equilibrium reached; its ``status`` says how. While anything touches, the cables are not slackened
+            together below a pretension of 0.05 mm, where the shape would be undetermined.
+
+        Raises:
+            ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
+        """
+        return self._follow(equilibrium.block, check_cables(self.robot, self.scene, equilibrium, cables_mm))
+
+    def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> np.ndarray:
+        """Nodes of every shape accepted on the way of :meth:`step`, from the present one on, ``(k, n+1, 3)`` [mm].
+
+        Raises:
+            ValueError: As :meth:`step`.
+        """
+        cables = check_cables(self.robot, self.scene, equilibrium, cables_mm)
+        shapes = self._kernel.trace(equilibrium.block, (*cables, self.robot.length_mm))
+        return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
+
+    def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
+        reached = np.empty_like(block)
+        status, iterations = self._kernel.step(block, (*cables, self.robot.length_mm), reached)
+        return SpatialEquilibrium(self.robot, self.scene, reached, Status(status), iterations)
+
+
+class SpatialBatchSolver(BaseBatch):
+    """Many robots in space, each moved as :class:`SpatialSolver` would; see :class:`solver.batch.BaseBatch`."""
+
+    model: ClassVar[Model] = SPACE
+
+    def _make_layout(self, obstacles: int) -> Layout:
+        return spatial_layout(self.robot, obstacles)
+
+    def _make_fleet(self, obstacles: int, threads: int) -> _kernel.SpatialFleet:
+        return _kernel.SpatialFleet(kernel_robot(self.robot), self.count, obstacles, threads)
+
+    def _kernel_scene(self, scene: Scene) -> _kernel.SpatialScene:
+        return kernel_scene(self.robot, scene)
+
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, iterations: int) -> SpatialEquilibrium:
+        return SpatialEquilibrium(self.robot, scene, block, status, iterations)
+
+
+def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
+    """A robot as the kernel takes it."""
+    return _kernel.Robot(
+        sliding=False,
+        segments=robot.segments,
+        offset=robot.offset_mm,
+        angle=robot.angle,
+        rigidity=robot.rigidity,
+        max_tension=robot.max_tension,
+        max_length=robot.length_mm,
+        lines=robot.lines_mm.tolist(),
+        between=robot.between,
+    )
+
+
+def kernel_scene(robot: SpatialRobot, scene: Scene) -> _kernel.SpatialScene:
+    """Obstacles as the kernel takes them.
+
+    Raises:
+        ValueError: If an obstacle is one of the plane or names a node that the robot does not have.
+    """
+    check_space(scene)
+    return _kernel.SpatialScene(*scene_arrays(robot, scene))
+
+
+def check_space(scene: Scene) -> None:
+    """Refuse obstacles of the plane.
+
+    Raises:
+        ValueError: Naming one.
+    """
+    for obstacle in scene:
+        if obstacle.space != SPACE.space:
+            raise ValueError(f"{obstacle!r} is an obstacle of the plane; give one of solver.spatial")
+
+
+def check_cables(
+    robot: SpatialRobot, scene: Scene, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
+) -> np.ndarray:
+    """Refuse a command out of range and an equilibrium of another robot or scene; returns the command, ``(2,)``.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    cables, limit = np.array(cables_mm, dtype=float), robot.cable_limit_mm
+    if not (cables.shape == (2,) and np.all(np.abs(cables) <= limit)):
+        raise ValueError(f"cables_mm is {cables_mm}; both must be within ±{limit:.6g} (robot.max_cable_mm)")
+    check_origin(robot, scene, equilibrium)
+    return cables
