@@ -23,6 +23,7 @@ def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    generate("segment_laws", [segment_function(), arc_function()], Path(sys.argv[1]))
-    generate("spatial_laws", [spatial.closure_function(), spatial.bend_function(), spatial.bow_function()], Path(sys.argv[1]))
-    generate("gap_laws", [gap_function(law) for law in (*GAP_LAWS, *spatial.GAP_LAWS)], Path(sys.argv[1]))
+    folder = Path(sys.argv[1])
+    in_space = [spatial.closure_function(), spatial.bend_function(), spatial.bow_function()]
+    generate("segment_laws", [segment_function(), arc_function(), *in_space], folder)
+    generate("gap_laws", [gap_function(law) for law in (*GAP_LAWS, *spatial.GAP_LAWS)], folder)

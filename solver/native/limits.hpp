@@ -13,6 +13,7 @@ inline constexpr double kFeasibility = 1e-10;
 inline constexpr double kWidestTurn = 3.1;     // angle between consecutive disks, within which the laws hold
 inline constexpr int kRelaxIterations = 8;     // of Newton's method for the shape that nothing touches
 inline constexpr int kClosureIterations = 12;  // of Newton's method for the bending of a segment in space
+inline constexpr double kWidestBend = 2.0;     // square of 2 sin θ/2 of a segment in space: a quarter turn
 inline constexpr double kClosed = 1e-15;       // change of it that is the last one
 inline constexpr double kRelaxed = 1e-12;      // relative change that is the last one, being squared
 

@@ -1,37 +1,49 @@
-// The two models of a segment and its cable, with their generated laws for all segments of a robot.
+// The models of a segment and its cables, with their generated laws for all segments of a robot.
 #pragma once
 
 #include <vector>
 
 namespace ccr {
 
-// Bends of all segments, kept number by number so that the laws can write them several segments at a time: what the laws
-// give, then the chord in the base frame.
-template <class Bend>
-class Table {
+// Numbers of all segments, kept number by number so that the laws can read and write them several segments at a time.
+class Rows {
  public:
-  static constexpr int kLaws = 10;
+  Rows(int numbers, int segments)
+      : stride_((segments + kPadding - 1) / kPadding * kPadding), values_(numbers * stride_) {}
 
-  explicit Table(int segments)
-      : stride_((segments + kPadding - 1) / kPadding * kPadding), values_((kLaws + 2) * stride_) {}
-
-  Bend operator[](int i) const {
-    return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
-            at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
-  }
   double* row(int number) { return values_.data() + number * stride_; }
-  void place(int segment, double dx, double dy) {
-    row(kLaws)[segment] = dx;
-    row(kLaws + 1)[segment] = dy;
+  const double* row(int number) const { return values_.data() + number * stride_; }
+  double at(int number, int segment) const { return values_[number * stride_ + segment]; }
+  void put(int segment, const double* numbers, int count, int first = 0) {
+    for (int k = 0; k < count; ++k) values_[(first + k) * stride_ + segment] = numbers[k];
+  }
+  void get(int segment, double* numbers, int count) const {
+    for (int k = 0; k < count; ++k) numbers[k] = at(k, segment);
   }
 
  private:
   static constexpr int kPadding = 4;  // at least the width of the lanes
 
-  double at(int number, int segment) const { return values_[number * stride_ + segment]; }
-
   int stride_;
   std::vector<double> values_;
+};
+
+// Bends of all segments in the plane: what the laws give, then the chord in the base frame.
+template <class Bend>
+class Table : public Rows {
+ public:
+  static constexpr int kLaws = 10;
+
+  explicit Table(int segments) : Rows(kLaws + 2, segments) {}
+
+  Bend operator[](int i) const {
+    return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
+            at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
+  }
+  void place(int segment, double dx, double dy) {
+    row(kLaws)[segment] = dx;
+    row(kLaws + 1)[segment] = dy;
+  }
 };
 
 // The cable is shared equally among the segments (the paper). A segment shears: its coordinate is σ, the sine of the
@@ -73,6 +85,25 @@ struct SlidingCable {
   using Bends = Table<Bend>;
 
   static void bend(int n, const double* angles, double pull, double length, double offset, Bends& bends);
+};
+
+// Two cables in space, each shared equally among the segments. The controls of a segment are its shears and its twist; the
+// lengths of the cables give its bending.
+struct TwoCables {
+  static constexpr int kControl = 3, kBending = 2, kBend = 48, kAdjoint = 6, kBow = 9;
+
+  // What all segments are told.
+  struct Told {
+    double pulls[2];  // of each cable
+    double length;
+    double holes[4];  // of the cables that are pulled
+  };
+
+  // The bendings of n segments and what the law `ccr_bend` says of them; false where a cable cannot have its length.
+  static bool bend(int n, const Told& told, const Rows& controls, Rows& bendings, Rows& bends);
+
+  // The curvatures of n segments seen by adjoints, what the law `ccr_bow` says.
+  static void bow(int n, const Told& told, const Rows& controls, const Rows& bendings, const Rows& adjoints, Rows& bows);
 };
 
 }  // namespace ccr

@@ -3,11 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "limits.hpp"
-
-// The generated laws of a segment, inlined here.
-#define CASADI_SYMBOL_EXPORT static inline
-#include "spatial_laws.c"
 
 namespace ccr {
 
@@ -16,8 +11,11 @@ Spatial::Spatial(const Robot& robot)
       frames(robot.segments + 1),
       gradient(robot.segments),
       robot_(robot),
-      controls_(robot.segments),
-      bendings_(robot.segments),
+      controls_(TwoCables::kControl, robot.segments),
+      bendings_(TwoCables::kBending, robot.segments),
+      laws_(TwoCables::kBend, robot.segments),
+      adjoints_(TwoCables::kAdjoint, robot.segments),
+      bows_(TwoCables::kBow, robot.segments),
       bends_(robot.segments),
       forces_(robot.segments),
       moments_(robot.segments) {}
@@ -33,36 +31,17 @@ void Spatial::tell(const Command<2>& command) {
   told_.length = command.length / robot_.segments;
 }
 
-// The bending with which the cables have their lengths, by Newton's method from the straight segment.
-bool Spatial::close(const Control& control, Vec<2>& bending) const {
-  bending = {};
-  const double* in[] = {control.v.data(), bending.v.data(), told_.pulls.v.data(), &told_.length, told_.holes.data()};
-  for (int i = 0; i < limits::kClosureIterations; ++i) {
-    double law[6];
-    double* out[] = {law};
-    ccr_closure(in, out, nullptr, nullptr, 0);
-    const double determinant = law[2] * law[5] - law[3] * law[4];
-    const Vec<2> change = {{(law[3] * law[1] - law[5] * law[0]) / determinant, (law[4] * law[0] - law[2] * law[1]) / determinant}};
-    bending += change;
-    const double size = std::abs(change[0]) + std::abs(change[1]);
-    if (!(size < 2)) return false;
-    if (size <= limits::kClosed) return true;
-  }
-  return false;
-}
-
 bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& controls) {
   tell(command);
-  controls_ = controls;
+  const int n = robot_.segments;
+  for (int i = 0; i < n; ++i) controls_.put(i, controls[i].v.data(), kControl);
+  if (!TwoCables::bend(n, told_, controls_, bendings_, laws_)) return false;
   objective = steepest = 0;
   states[0] = {};
   frames[0] = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
-  for (int i = 0; i < robot_.segments; ++i) {
-    if (!close(controls[i], bendings_[i])) return false;
+  for (int i = 0; i < n; ++i) {
     Bend& bend = bends_[i];
-    const double* in[] = {controls[i].v.data(), bendings_[i].v.data(), told_.pulls.v.data(), &told_.length, told_.holes.data()};
-    double* out[] = {bend.chord.v.data()};
-    ccr_bend(in, out, nullptr, nullptr, 0);
+    laws_.get(i, bend.chord.v.data(), TwoCables::kBend);
     const Vec<3> chord = times(frames[i], bend.chord);
     states[i + 1] = states[i];
     for (int k = 0; k < 3; ++k) states[i + 1][k] += chord[k];
@@ -83,6 +62,8 @@ void Spatial::adjoin(const std::vector<State>& pulls) {
     }
     forces_[i] = transpose_times(frames[i], force);
     moments_[i] = transpose_times(frames[i], moment);
+    adjoints_.put(i, forces_[i].v.data(), 3);
+    adjoints_.put(i, moments_[i].v.data(), 3, 3);
     gradient[i] = bend.objective_slope;
     gradient[i] += transpose_times(bend.chord_slope, forces_[i]);
     gradient[i] += transpose_times(bend.turn_slope, moments_[i]);
@@ -91,6 +72,7 @@ void Spatial::adjoin(const std::vector<State>& pulls) {
 }
 
 void Spatial::curvature(System& system) const {
+  TwoCables::bow(robot_.segments, told_, controls_, bendings_, adjoints_, bows_);
   for (int i = 0; i < robot_.segments; ++i) {
     const Bend& bend = bends_[i];
     const Frame& frame = frames[i];
@@ -112,10 +94,7 @@ void Spatial::curvature(System& system) const {
       const Vec<3> twisted = cross({{turn_slope(0, k), turn_slope(1, k), turn_slope(2, k)}}, moment);
       for (int c = 0; c < 3; ++c) stage.hux(k, 3 + c) = swung[c] + twisted[c] / 2;
     }
-    const double* in[] = {controls_[i].v.data(), bendings_[i].v.data(), told_.pulls.v.data(), &told_.length, told_.holes.data(),
-                          forces_[i].v.data(), moments_[i].v.data()};
-    double* out[] = {stage.huu.v.data()};
-    ccr_bow(in, out, nullptr, nullptr, 0);
+    bows_.get(i, stage.huu.v.data(), TwoCables::kBow);
   }
   system.node_hessian[robot_.segments] = {};
 }

@@ -5,6 +5,7 @@
 
 #include "riccati.hpp"
 #include "robot.hpp"
+#include "segment.hpp"
 
 namespace ccr {
 
@@ -82,7 +83,7 @@ class Spatial {
   double steepest = 0;  // largest slope of the objective alone
 
  private:
-  // What the generated law of a segment gives, in the frame of its lower disk.
+  // What the law of a segment gives, in the frame of its lower disk.
   struct Bend {
     Vec<3> chord;
     Mat<3, 3> rotation;
@@ -93,20 +94,14 @@ class Spatial {
     Mat<3, 2> chord_pull_slope, turn_pull_slope;
   };
 
-  // What all segments are told.
-  struct Told {
-    Vec<2> pulls;  // of each cable
-    double length;
-    std::array<double, 4> holes;  // of the cables that are pulled
-  };
+  static_assert(sizeof(Bend) == TwoCables::kBend * sizeof(double));
 
   void tell(const Command<2>& command);
-  bool close(const Control& control, Vec<2>& bending) const;
 
   Robot robot_;
-  Told told_{};
-  std::vector<Control> controls_;
-  std::vector<Vec<2>> bendings_;
+  TwoCables::Told told_{};
+  Rows controls_, bendings_, laws_, adjoints_;
+  mutable Rows bows_;
   std::vector<Bend> bends_;
   std::vector<Vec<3>> forces_, moments_;  // adjoints of the state each segment leads to, in its lower disk's frame
 };

@@ -16,8 +16,7 @@ from solver.formulation import TINY, GapLaw, NodeProblem, capsule_gap, circle_ga
 if TYPE_CHECKING:  # the build runs this file without the package
     from solver.spatial.robot import SpatialRobot
 
-SERIES_BELOW = 1e-2  # square of the half sine of an angle below which its series serves
-SERIES_TERMS = 9  # of that series: to the last digit there
+HALVINGS, SERIES_TERMS = 2, 12  # of an angle, and of the power series of its square: to the last digit for a quarter turn
 
 
 def cylinder_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -48,24 +47,24 @@ BOX = GapLaw("box", box_gap, 16, (15,), 3)
 GAP_LAWS = (SPHERE, HALF_SPACE, CAPSULE, CYLINDER, BOX)
 
 
-def square_angle(square: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """``θ² = (2 asin √q)²`` in the square q of the half sine of an angle, and its first two derivatives, smooth at zero.
+def square_angle(square: ca.SX, halvings: int = HALVINGS) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """``θ² = (2 asin √q)²`` in the square q of the half sine of an angle up to π/2, and its first two derivatives.
 
-    The first is 4 g with ``g = θ / sin θ``, whose own slope follows from it.
+    By the power series of a quarter of the angle; halving it turns q into ``(1 − √(1 − q)) / 2``.
     """
-    term, coefficients = 1.0, []
-    for k in range(SERIES_TERMS + 1):
-        coefficients.append(term)
-        term *= 2 * (k + 1) / (2 * k + 3)
-    small = ca.fmin(square, SERIES_BELOW)
-    ratio = sum(c * small**k for k, c in enumerate(coefficients))
-    slope = sum(k * c * small ** (k - 1) for k, c in enumerate(coefficients) if k)
-    large, near = ca.fmax(square, SERIES_BELOW), square < SERIES_BELOW
-    sine = large * (1 - large)
-    exact = ca.asin(ca.sqrt(large)) / ca.sqrt(sine)
-    ratio = ca.if_else(near, ratio, exact)
-    slope = ca.if_else(near, slope, (1 - (1 - 2 * large) * exact) / (2 * sine))
-    return 4 * square * (1 - square) * ratio**2, 4 * ratio, 4 * slope
+    if halvings == 0:
+        coefficient, coefficients = 4.0, []
+        for k in range(1, SERIES_TERMS + 1):
+            coefficients.append((k, coefficient))
+            coefficient *= 2 * k * k / ((k + 1) * (2 * k + 1))
+        value, slope, bend = 0, 0, 0
+        for k, c in reversed(coefficients):
+            value, slope = c + square * value, k * c + square * slope
+            bend = k * (k - 1) * c + square * bend if k > 1 else bend
+        return square * value, slope, bend
+    cosine = ca.sqrt(1 - square)
+    value, slope, bend = square_angle(square / (2 * (1 + cosine)), halvings - 1)
+    return 4 * value, slope / cosine, (bend / 4 + slope / (2 * cosine)) / (1 - square)
 
 
 class _Segment:
@@ -84,8 +83,9 @@ class _Segment:
     @property
     def closure(self) -> ca.SX:
         """Squares of the cable lengths less their values, over twice the backbone: zero at its shape, ``(2,)`` [mm]."""
-        squares = [ca.dot(self.along, way) + ca.sumsqr(way) / (2 * self.length) for way in self.ways]
-        return ca.vertcat(*squares) + self.pulls * (2 * self.length - self.pulls) / (2 * self.length)
+        per_length = 1 / (2 * self.length)
+        squares = [ca.dot(self.along, way) + ca.sumsqr(way) * per_length for way in self.ways]
+        return ca.vertcat(*squares) + self.pulls * (1 - self.pulls * per_length)
 
     @property
     def squares(self) -> ca.SX:
@@ -132,7 +132,7 @@ def bend_function() -> ca.Function:
     """
     segment = _Segment()
     bending, inverse = segment.bending, _inverse(ca.jacobian(segment.closure, segment.bending))
-    values, rates, _ = (ca.vertcat(*parts) for parts in zip(*map(square_angle, ca.vertsplit(segment.squares)), strict=True))
+    values, rates, _ = (ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(segment.squares)), strict=True))
     outputs = [segment.chord, ca.vec(segment.rotation.T), ca.sum1(values)]
     for inputs in (segment.control, segment.pulls):
         bent = -inverse @ ca.jacobian(segment.closure, inputs)
@@ -154,7 +154,7 @@ def bow_function() -> ca.Function:
     control, bending = segment.control, segment.bending
     both = ca.vertcat(control, bending)
     squares, held, rated = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
-    _, rates, bends = (ca.vertcat(*parts) for parts in zip(*map(square_angle, ca.vertsplit(squares)), strict=True))
+    _, rates, bends = (ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True))
     work = ca.dot(rated, squares) + ca.dot(force, segment.chord)
     axis = ca.jacobian(segment.axis, both)
     moments = axis.T @ segment.turning.T @ moment  # slope of the work of the moment
