@@ -16,7 +16,7 @@ from agents.figures import draw_shape
 from solver import Equilibrium, Robot, Scene, Solver
 from solver.forces import VirtualWork
 from solver.free import fitted_slopes, free_nodes, tip_slopes
-from solver.spatial import SpatialEquilibrium, SpatialReferenceSolver, SpatialRobot
+from solver.spatial import SpatialEquilibrium, SpatialRobot, SpatialSolver
 
 ROBOT = Robot.prototype(max_tension=math.inf)
 FIT_RANGE = (0.0, 8.0)  # cable displacements the straight lines of Fig. 7 are fitted over [mm]
@@ -200,9 +200,9 @@ def _draw_contact_points(axis: Axes) -> None:
 
 def _draw_space(axis: Any) -> None:
     for cables in ((5.0, 0.0), (0.0, 5.0), (5.0, 5.0)):
-        backbone, *holes = bent(cables).points
-        axis.plot(*backbone.T, lw=2.5, label=f"pulls {cables[0]:.0f} and {cables[1]:.0f} mm")
-        for hole in holes:
+        equilibrium = bent(cables)
+        axis.plot(*equilibrium.nodes.T, lw=2.5, label=f"pulls {cables[0]:.0f} and {cables[1]:.0f} mm")
+        for hole in equilibrium.pulled:
             axis.plot(*hole.T, color="0.6", lw=0.8)
     axis.set(title="Fig. 11: two cables in space", xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
     axis.set(xlim=(-10, 80), ylim=(-10, 80), zlim=(0, 180), xticks=(0, 40, 80), yticks=(0, 40, 80))
@@ -213,7 +213,7 @@ def _draw_space(axis: Any) -> None:
 
 def bent(cables_mm: tuple[float, float]) -> SpatialEquilibrium:
     """The robot in space with both cables pulled (eq. 13)."""
-    solver = SpatialReferenceSolver(SpatialRobot.prototype())
+    solver = SpatialSolver(SpatialRobot.prototype(), Scene())
     return solver.step(solver.rest(), cables_mm)
 
 

@@ -2,6 +2,7 @@
 
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
+from solver.spatial.reference import SpatialReferenceSolver
 from solver.spatial.robot import SpatialRobot
 from solver.spatial.solve import SpatialBatchSolver, SpatialSolver
 
@@ -12,6 +13,7 @@ __all__ = [
     "HalfSpace",
     "SpatialBatchSolver",
     "SpatialEquilibrium",
+    "SpatialReferenceSolver",
     "SpatialRobot",
     "SpatialSolver",
     "Sphere",

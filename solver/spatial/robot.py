@@ -117,11 +117,16 @@ class SpatialRobot:
         return self.segments * (self.between + 1) + 1
 
     @property
+    def segment_mm(self) -> float:
+        """Length l0 of a backbone segment [mm]."""
+        return self.length_mm / self.segments
+
+    @property
     def spacing_mm(self) -> float:
         """Distance between neighbouring points of the backbone that can touch [mm]."""
-        return self.length_mm / self.segments / (self.between + 1)
+        return self.segment_mm / (self.between + 1)
 
     @property
     def stiffness(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective [rad²] into energy."""
-        return self.rigidity * self.segments / (2 * self.length_mm)
+        return self.rigidity / (2 * self.segment_mm)

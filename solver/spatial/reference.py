@@ -1,0 +1,189 @@
+"""The reference solver in space: eq. 13 in the node coordinates of the paper, through CasADi and IPOPT."""
+
+import math
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from solver.reference import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
+from solver.scene import Scene
+from solver.solve import check_clear, check_width
+from solver.geometry import touchable_points
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
+from solver.spatial.formulation import spatial_problem
+from solver.spatial.robot import SpatialRobot
+from solver.spatial.solve import check_cables, check_space
+from solver.status import Status
+
+
+class SpatialReferenceSolver:
+    """Follows the same equilibria as :class:`solver.spatial.SpatialSolver`, by the problem as the paper writes it.
+
+    Only a branch is followed: where it ends in a snap or a jam, a step is ``FAILED``. Tensions are reported and not
+    limited.
+
+    Args:
+        robot: The robot.
+        scene: The obstacles.
+
+    Raises:
+        ValueError: As :class:`solver.spatial.SpatialSolver`.
+    """
+
+    def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
+        self.robot, self.scene = robot, scene
+        check_space(scene)
+        check_width(robot, scene)
+        self._touchable = touchable_points(robot, scene)
+        problem = spatial_problem(robot, scene.laws, scene.mounted)
+        self._equalities = problem.equalities.shape[0]
+        constraints = ca.vertcat(problem.equalities, problem.inequalities)
+        nlp: dict[str, Any] = {
+            "x": problem.unknowns,
+            "p": ca.vertcat(problem.parameters, unit := ca.MX.sym("unit")),
+            "f": problem.objective / unit**2,
+            "g": constraints,
+        }
+        self._ipopt = ca.nlpsol("spatial_reference", "ipopt", nlp, OPTIONS)
+        multipliers = ca.MX.sym("multipliers", constraints.shape[0])
+        slopes = ca.gradient(problem.objective + ca.dot(multipliers, constraints), problem.parameters)[:2]
+        self._cable_slopes = ca.Function("slopes", [problem.unknowns, problem.parameters, multipliers], [slopes])
+        self._rest = self._free(np.zeros(2))
+        check_clear(self._rest)
+
+    def rest(self) -> SpatialEquilibrium:
+        """The straight, unactuated robot."""
+        return self._rest
+
+    def step(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> SpatialEquilibrium:
+        """Move both pairs of cables evenly to displacements, along the branch.
+
+        Args:
+            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
+            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm].
+
+        Raises:
+            ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
+        """
+        target = check_cables(self.robot, self.scene, equilibrium, cables_mm)
+        now, largest = equilibrium, LARGEST_STEP
+        while (distance := np.abs(target - now.cables_mm).max()) > 0:
+            part = min(1.0, largest / distance)
+            following = self._solve(now, target if part == 1 else now.cables_mm + part * (target - now.cables_mm))
+            if following is not None:
+                now = following
+            elif largest > SMALLEST_STEP:
+                largest /= 2
+            else:
+                return SpatialEquilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.FAILED, 0)
+        return now
+
+    def _solve(self, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialEquilibrium | None:
+        free = self._free(cables)
+        if np.abs(cables).max() < SLACK or (not start.contact.any() and free.gaps.min(initial=1.0) > 0):
+            return free
+        unknowns, _, _, pushes = start.node_solution()
+        unit = np.abs(cables).max() / (self.robot.segments * self.robot.offset_mm)
+        parameters = np.array([*cables, self.robot.length_mm, self.robot.rigidity, *self.scene.parameters])
+        bounded = self._touchable[:, :, 1:].ravel()
+        zeros = np.zeros(self._equalities)
+        solution = self._ipopt(
+            x0=unknowns,
+            lam_g0=np.r_[zeros, -pushes / unit**2],
+            p=np.r_[parameters, unit],
+            lbg=np.r_[zeros, np.where(bounded, 0.0, -np.inf)],
+            ubg=np.r_[zeros, np.full(bounded.size, np.inf)],
+        )
+        reached = solution["x"].full().ravel()
+        moved = np.linalg.norm((reached - unknowns).reshape(-1, 3), axis=1).max()
+        allowed = MOVE_OFFSET + MOVE_SLOPE * np.abs(cables - start.cables_mm).max()
+        stats = self._ipopt.stats()
+        if not (stats["success"] and moved <= allowed):
+            return None
+        multipliers = solution["lam_g"].full().ravel()
+        held = -multipliers[self._equalities :]
+        held[held < np.abs(solution["g"].full().ravel()[self._equalities :])] = 0.0  # what the barrier left
+        slopes = unit**2 * self._cable_slopes(reached, parameters, multipliers).full().ravel()
+        tensions = np.where(cables < 0, -1.0, 1.0) * slopes * self.robot.stiffness
+        n = self.robot.segments
+        nodes, first, second = (np.vstack([np.zeros(3), part]) for part in reached[: 9 * n].reshape(3, n, 3))
+        sides = np.where(cables < 0, -1.0, 1.0)
+        disks = np.stack([first[1:] - nodes[1:], second[1:] - nodes[1:]], axis=1)  # (n, 2, 3)
+        frames = np.tile(np.eye(3), (n + 1, 1, 1))
+        frames[1:, :, :2] = np.swapaxes(np.linalg.solve((sides[:, None] * self.robot.holes)[:, :2], disks), 1, 2)
+        frames[1:, :, 2] = np.cross(frames[1:, :, 0], frames[1:, :, 1])
+        return self._equilibrium(
+            cables, tensions, nodes, frames, unit**2 * held, reached[9 * n :], int(stats["iter_count"])
+        )
+
+    def _free(self, cables: np.ndarray) -> SpatialEquilibrium:
+        """The robot that nothing touches: every segment turns alike, towards b with ``h·b = pull`` for both holes h."""
+        n, length, holes = self.robot.segments, self.robot.segment_mm, self.robot.holes
+        towards = np.append(np.linalg.solve(holes[:, :2], cables / n), 0.0)  # 2 sin θ/2 along the bend
+        size = float(np.linalg.norm(towards))
+        angle = 2 * math.asin(size / 2)
+        direction = towards / size if size > 0 else np.array([1.0, 0.0, 0.0])
+        up = np.array([0.0, 0.0, 1.0])
+        axis = np.cross(up, direction)
+        turn = np.cross(axis, np.eye(3)).T  # of a vector, about the axis of the bend
+        angles = (angle * np.arange(n + 1))[:, None, None]
+        frames = np.eye(3) + np.sin(angles) * turn + (1 - np.cos(angles)) * (turn @ turn)
+        middles = angle * (np.arange(n) + 0.5)
+        nodes = np.zeros((n + 1, 3))
+        nodes[1:] = length * np.cumsum(np.sin(middles)[:, None] * direction + np.cos(middles)[:, None] * up, axis=0)
+        half_sines = cables / (2 * n * self.robot.offset_mm)
+        slopes = 4 * np.arcsin(half_sines) / np.sqrt(1 - half_sines**2) / self.robot.offset_mm
+        tensions = np.where(cables < 0, -1.0, 1.0) * self.robot.stiffness * slopes
+        return self._equilibrium(cables, tensions, nodes, frames, None, None, 0)
+
+    def _equilibrium(
+        self,
+        cables: np.ndarray,
+        tensions: np.ndarray,
+        nodes: np.ndarray,
+        frames: np.ndarray,
+        pushes: np.ndarray | None,
+        mounts: np.ndarray | None,
+        iterations: int,
+    ) -> SpatialEquilibrium:
+        """An equilibrium with what belongs to its shape; its onset and free slopes are not told."""
+        places = spatial_layout(self.robot, len(self.scene))
+        block = np.zeros(places.size)
+        places.cables(block)[:] = cables
+        places.length(block)[:] = self.robot.length_mm
+        places.tensions(block)[:] = tensions
+        places.coordinates(block)[:] = _controls(nodes, frames)
+        places.nodes(block)[:], places.frames(block)[:] = nodes, frames
+        if pushes is not None and mounts is not None:
+            places.multipliers(block)[:, :, 1:] = pushes.reshape(self._touchable[:, :, 1:].shape)
+            places.displacements(block)[list(self.scene.mounted)] = mounts.reshape(-1, 3)
+        points = touching_points(self.robot, nodes, frames)
+        for j, (obstacle, moved) in enumerate(zip(self.scene, places.displacements(block), strict=True)):
+            places.gaps(block)[j] = np.where(self._touchable[j], obstacle.gap(points - moved), np.inf)
+            pushed = places.multipliers(block)[j, ..., None] * obstacle.normal_at(points - moved)
+            places.forces(block)[j] = self.robot.stiffness * pushed.sum(axis=(0, 1))
+        places.force(block)[:] = places.forces(block).sum(axis=0)
+        places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
+        places.flags(block)[:] = (places.multipliers(block) > 0).any(axis=0).ravel()
+        angles = [_angles(frames @ hole / self.robot.offset_mm) for hole in self.robot.holes]
+        places.objective(block)[:] = np.sum(np.square(angles))
+        return SpatialEquilibrium(self.robot, self.scene, block, Status.CONVERGED, iterations)
+
+
+def _angles(directions: np.ndarray) -> np.ndarray:
+    """Angles between consecutive unit vectors, ``(n,)``."""
+    return np.asarray(2 * np.arcsin(np.linalg.norm(np.diff(directions, axis=0), axis=1) / 2))
+
+
+def _controls(nodes: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Shears and twists of the segments of a shape, ``(n, 3)``."""
+    turns = np.swapaxes(frames[:-1], 1, 2) @ frames[1:]
+    cosines = np.sqrt(1 + np.trace(turns, axis1=1, axis2=2)) / 2  # of half the angle
+    twisted = turns - np.swapaxes(turns, 1, 2)
+    axes = np.stack([twisted[:, 2, 1], twisted[:, 0, 2], twisted[:, 1, 0]], axis=1) / (2 * cosines[:, None])
+    chords = np.einsum("nji,nj->ni", frames[:-1], np.diff(nodes, axis=0))
+    halves = np.sqrt((1 + cosines) / 2)[:, None]
+    across = -2 * np.cross(axes / (4 * halves), chords)
+    back = chords + halves * across - np.cross(axes / (4 * halves), across)
+    return np.column_stack([(back / np.linalg.norm(chords, axis=1)[:, None])[:, :2], axes[:, 2]])
