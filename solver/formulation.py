@@ -335,14 +335,18 @@ def node_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bo
 
 @lru_cache(maxsize=32)
 def kkt_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
-    """Derivatives of the optimality conditions of :func:`node_problem`.
-
-    With the change ``v`` of (l, L0) and the motion of each obstacle, the Lagrangian
-    ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities, inequalities)`` and loads ``L_v``:
-    ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the multipliers stands in ``F_v`` already.
-    """
+    """:func:`second_derivatives` of :func:`node_problem`."""
     change = ca.MX.sym("change", 2 + 4 * len(laws))
-    problem = node_problem(robot, laws, mounted, change)
+    return second_derivatives(node_problem(robot, laws, mounted, change), change)
+
+
+def second_derivatives(problem: NodeProblem, change: ca.MX) -> ca.Function:
+    """Derivatives of the optimality conditions of a problem that was built with a change ``v`` of what it is told.
+
+    With the Lagrangian ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities, inequalities)``
+    and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the multipliers stands in
+    ``F_v`` already.
+    """
     _, _, objective, equalities, inequalities = problem
     tensions, pushes = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("pushes", inequalities.shape[0])
     lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(pushes, inequalities)

@@ -5,10 +5,12 @@ derivatives :mod:`solver.formulation` gives, and one back-substitution a paramet
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
-from solver.equilibrium import Equilibrium
+from solver.equilibrium import BaseEquilibrium, Equilibrium
 from solver.formulation import kkt_derivatives
 
 
@@ -60,60 +62,85 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     sliding = robot.cable == "sliding"
     if not sliding and not equilibrium.cable_mm > 0:
         raise ValueError(f"cable_mm is {equilibrium.cable_mm}; it must be positive, for the shear to be determined")
-    active = equilibrium.contact if active is None else active
-    if active.shape != equilibrium.contact.shape:
-        raise ValueError(
-            f"active has shape {active.shape}; it must have that of the multipliers, {equilibrium.contact.shape}"
-        )
-    conditions, varied, loads, load_slopes = _derivatives(equilibrium)
-    taut = [equilibrium.tension > 0] if sliding else []
-    unknowns = conditions.shape[1]
-    equations = unknowns + 3 * robot.segments
-    kept = np.concatenate([np.ones(equations, bool), taut, active[:, :, 1:].ravel()]).astype(bool)
-    slopes, varied = conditions[kept], varied[kept]
-    count = len(slopes)
-    kkt = np.zeros((count, count))
-    kkt[:, :unknowns] = slopes
-    kkt[:unknowns, unknowns:] = -slopes[unknowns:].T
-    change = np.linalg.solve(kkt, -varied)
-    # The loads are L_v, so their slopes in (z, ν, λ) are those of (L_z, −equalities, −gaps) in v.
-    signed = varied.copy()
-    signed[unknowns:] *= -1
-    load_changes = (signed.T @ change + load_slopes).T
-    load_changes[LENGTH] -= loads / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
-    _turn_about_centres(equilibrium, change.T, load_changes)
-
-    multipliers = np.zeros((len(loads), *active.shape))
-    inner = np.zeros((len(loads), active[:, :, 1:].size))
-    inner[:, active[:, :, 1:].ravel()] = change[equations + sum(taut) :].T
-    multipliers[:, :, :, 1:] = inner.reshape(multipliers[:, :, :, 1:].shape)
-    forces = load_changes[:, 2:].reshape(len(loads), len(scene), 4)[:, :, :2]
+    kkt = kkt_derivatives(robot, scene.laws, scene.mounted)
+    change = respond(equilibrium, kkt, active, [equilibrium.tension > 0] if sliding else [])
+    load_changes = change.loads
+    load_changes[LENGTH] -= change.load / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
+    for rows in (change.unknowns, change.multipliers, load_changes):
+        _turn_about_centres(equilibrium, rows)
+    forces = load_changes[:, 2:].reshape(len(load_changes), len(scene), 4)[:, :, :2]
     displacements = np.zeros_like(forces)
-    displacements[:, list(scene.mounted)] = change[4 * robot.segments : unknowns].T.reshape(len(loads), -1, 2)
+    mounts = change.unknowns[:, 4 * robot.segments :]
+    displacements[:, list(scene.mounted)] = mounts.reshape(len(mounts), -1, 2)
     return Sensitivity(
-        nodes=_node_slopes(equilibrium, change[: 4 * robot.segments].T),
-        multipliers=multipliers,
+        nodes=_node_slopes(equilibrium, change.unknowns[:, : 4 * robot.segments]),
+        multipliers=change.multipliers,
         tension=equilibrium.stiffness * load_changes[:, CABLE],
         forces=equilibrium.stiffness * forces,
         displacements=displacements,
     )
 
 
-def _derivatives(equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """``F_z, F_v, L_v, L_vv`` of :func:`solver.formulation.kkt_derivatives` at an equilibrium."""
-    function = kkt_derivatives(equilibrium.robot, equilibrium.scene.laws, equilibrium.scene.mounted)
-    values = function(*equilibrium.node_solution())
-    conditions, varied, loads, load_slopes = (value.full() for value in values)
-    return conditions, varied, loads.ravel(), load_slopes
+class Response(NamedTuple):
+    """How a solution of a node-coordinate problem changes with what it is told, along the first axis of each array.
+
+    Attributes:
+        unknowns: Slopes of the unknowns, ``(q, z)``.
+        multipliers: Slopes of the multipliers of the contacts, ``(q, m, p, k)``.
+        loads: Slopes of the loads ``L_v``, ``(q, q)``.
+        load: The loads themselves, ``(q,)``.
+    """
+
+    unknowns: np.ndarray
+    multipliers: np.ndarray
+    loads: np.ndarray
+    load: np.ndarray
 
 
-def _turn_about_centres(equilibrium: Equilibrium, *rows: np.ndarray) -> None:
+def respond(equilibrium: BaseEquilibrium, kkt: ca.Function, active: np.ndarray | None, held: list[bool]) -> Response:
+    """Solve the linearised optimality conditions for a change of everything that the problem is told.
+
+    Args:
+        equilibrium: Where.
+        kkt: :func:`~solver.formulation.second_derivatives` of its node-coordinate problem.
+        active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier.
+        held: Which of the inequalities before the contacts stay closed.
+
+    Raises:
+        ValueError: If ``active`` has the wrong shape.
+    """
+    active = equilibrium.contact if active is None else active
+    if active.shape != equilibrium.contact.shape:
+        raise ValueError(
+            f"active has shape {active.shape}; it must have that of the multipliers, {equilibrium.contact.shape}"
+        )
+    touching = active[:, :, 1:].ravel()
+    conditions, varied, loads, load_slopes = (value.full() for value in kkt(*equilibrium.node_solution()))
+    unknowns = conditions.shape[1]
+    equations = len(conditions) - len(held) - touching.size
+    kept = np.concatenate([np.ones(equations, bool), held, touching]).astype(bool)
+    slopes, varied = conditions[kept], varied[kept]
+    count = len(slopes)
+    matrix = np.zeros((count, count))
+    matrix[:, :unknowns] = slopes
+    matrix[:unknowns, unknowns:] = -slopes[unknowns:].T
+    change = np.linalg.solve(matrix, -varied)
+    # The loads are L_v, so their slopes in (z, ν, λ) are those of (L_z, −equalities, −gaps) in v.
+    signed = varied.copy()
+    signed[unknowns:] *= -1
+    multipliers = np.zeros((change.shape[1], *active.shape))
+    inner = np.zeros((change.shape[1], touching.size))
+    inner[:, touching] = change[equations + sum(held) :].T
+    multipliers[:, :, :, 1:] = inner.reshape(multipliers[:, :, :, 1:].shape)
+    return Response(change[:unknowns].T.copy(), multipliers, (signed.T @ change + load_slopes).T, loads.ravel())
+
+
+def _turn_about_centres(equilibrium: Equilibrium, slopes: np.ndarray) -> None:
     """Make turns about the origin turns about each obstacle's centre, in place: they differ by a shift."""
     for j, obstacle in enumerate(equilibrium.scene):
         x, y = obstacle.extent.center
-        for slopes in rows:
-            shift_x, shift_y, turn, _ = slopes[obstacle_rows(j)]
-            turn += y * shift_x - x * shift_y
+        shift_x, shift_y, turn, _ = slopes[obstacle_rows(j)]
+        turn += y * shift_x - x * shift_y
 
 
 def _node_slopes(equilibrium: Equilibrium, change: np.ndarray) -> np.ndarray:

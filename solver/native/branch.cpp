@@ -503,7 +503,8 @@ Status Branch<Model>::follow(const Command& target) {
   return Status::kJammed;
 }
 
-// Tensions of the free robot where it first touches, between where the step began and where it is.
+// Tensions of the free robot where it first touches, between where the step began and where it is, each with the sign of
+// its displacement.
 template <class Model>
 Branch<Model>::Tensions Branch<Model>::first_tensions(const Command& start) {
   const auto clear = [&](double part) {
@@ -519,7 +520,10 @@ Branch<Model>::Tensions Branch<Model>::first_tensions(const Command& start) {
     }
   clear(high);
   newton_.chain.reduced_gradient(trial_.active);
-  return newton_.chain.tensions(trial_.active);
+  Tensions tensions = newton_.chain.tensions(trial_.active);
+  for (int k = 0; k < kCables; ++k)
+    if (trial_.command.cables[k] < 0) tensions[k] = -tensions[k];
+  return tensions;
 }
 
 template <class Model>

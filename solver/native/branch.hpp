@@ -22,7 +22,8 @@ class Follower {
   // An equilibrium as one block of numbers, in this order: cables, length, tensions, objective; coordinates of each
   // segment; x, y, angle or x, y, z of each node; frame of each node, the direction of the cable or a rotation matrix;
   // multiplier of each contact; gap of each contact; displacement of each obstacle; force of each obstacle on the robot;
-  // force of all of them; smallest gap; tensions where the present contact began, 0 without one; slopes of the free tip; 1
+  // force of all of them; smallest gap; tensions where the present contact began,
+  // signed as the displacements, 0 without one; slopes of the free tip; 1
   // for each point that touches, else 0; and with one cable the trend of the coordinates, of the displacements, and of the
   // multipliers of the active contacts in the order of the contacts.
   virtual std::size_t block_size() const = 0;

@@ -62,7 +62,7 @@ class SpatialEquilibrium(BaseEquilibrium):
 
     @property
     def onset_tensions(self) -> np.ndarray:
-        """Tensions where the present contact began, zero while nothing touches, ``(2,)`` [N]."""
+        """Tensions where the present contact began, signed as the displacements, zero while nothing touches, ``(2,)`` [N]."""
         return self._layout.onset(self.block)
 
     @property

@@ -1,0 +1,86 @@
+"""Contact force in space, read in two ways; see :mod:`solver.forces`.
+
+The energy force is that of the model, in any direction. The paper's virtual work is of the plane: one cable, one angle.
+Here it goes beyond the paper, to two cables. The free tip has one virtual displacement for each, and along both the work
+of the contact force is to balance that of the loads, ``c F·x'_k + Σ_j P_j M_jk = 0``, with the cable load P since the
+onset of the contact and M_jk the turn of the free tip towards cable j per displacement of cable k, times the offset. One
+unknown factor c of a known direction F meets both equations as well as can be, by least squares; the combination that
+counts is the one that moves the tip against the contact, in the plane of which this is eq. 10 of the paper. Friction is
+a ratio μ of the normal force along the way that the tip would slide on the surface in that motion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.spatial.equilibrium import SpatialEquilibrium
+
+TINY = 1e-300  # keeps quotients defined where nothing pushes
+
+
+def force_true(equilibrium: SpatialEquilibrium) -> np.ndarray:
+    """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 3)`` [N]."""
+    return equilibrium.forces.copy()
+
+
+def with_friction(forces: np.ndarray, slopes: np.ndarray, friction: float) -> np.ndarray:
+    """Normal forces with friction beside them, along the way the free tip would slide on the surface, ``(..., 3)``.
+
+    Args:
+        forces: Normal forces, ``(..., 3)``.
+        slopes: Slopes of the free tip's place in both displacements, ``(..., 2, 3)``.
+        friction: Ratio μ of tangential to normal force.
+    """
+    size = _norm(forces)
+    normal = forces / np.maximum(size, TINY)
+    against = -_dot(normal[..., None, :], slopes)  # how each displacement moves the tip into the surface
+    motion = against[..., :1] * slopes[..., 0, :] + against[..., 1:] * slopes[..., 1, :]
+    sliding = motion - _dot(motion, normal)[..., None] * normal
+    return np.asarray(forces + friction * size * sliding / np.maximum(_norm(sliding), TINY))
+
+
+def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """How many times a force does the virtual work that the cable loads do: c as above, ``(...,)``.
+
+    Zero for a force that does no work against the motion.
+
+    Args:
+        forces: Forces, ``(..., 3)``.
+        loads: Loads of both pairs of cables, signed as their displacements, ``(..., 2)`` [N].
+        slopes: Slopes of the free tip in both displacements, as :attr:`SpatialEquilibrium.tip_slopes`, ``(..., 2, 5)``.
+    """
+    works = _dot(forces[..., None, :], slopes[..., :3])
+    given = _dot(loads[..., None, :], slopes[..., 3:])
+    balance = _dot(works, given)
+    return np.asarray(np.where(balance < 0, -balance, 0.0) / np.maximum(_dot(works, works), TINY))
+
+
+@dataclass(frozen=True, slots=True)
+class SpatialVirtualWork:
+    """The virtual-work estimate in space; several obstacles share one unknown in proportion to their multipliers.
+
+    Attributes:
+        friction: Ratio μ of tangential to normal force.
+    """
+
+    friction: float = 0.0
+
+    def estimate(self, equilibrium: SpatialEquilibrium) -> np.ndarray:
+        """Estimated contact force, ``(m, 3)`` [N]."""
+        slopes = equilibrium.tip_slopes
+        forces = with_friction(equilibrium.forces, slopes[:, :3], self.friction)
+        loads = np.where(equilibrium.cables_mm < 0, -1.0, 1.0) * equilibrium.tensions - equilibrium.onset_tensions
+        return virtual_work(forces.sum(axis=0), loads, slopes) * forces
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Along the last axis, term by term, so that the bits do not depend on how many there are."""
+    product = a * b
+    total = product[..., 0]
+    for k in range(1, product.shape[-1]):
+        total = total + product[..., k]
+    return np.asarray(total)
+
+
+def _norm(a: np.ndarray) -> np.ndarray:
+    return np.asarray(np.sqrt(_dot(a, a))[..., None])

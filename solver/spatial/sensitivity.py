@@ -1,0 +1,100 @@
+"""How an equilibrium in space changes with its cables, its length and its obstacles; see :mod:`solver.sensitivity`."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from solver.formulation import GapLaw, second_derivatives
+from solver.sensitivity import respond
+from solver.spatial.equilibrium import SpatialEquilibrium
+from solver.spatial.formulation import spatial_problem
+from solver.spatial.robot import SpatialRobot
+
+CABLES, LENGTH = slice(0, 2), 2  # rows of a SpatialSensitivity
+MOTIONS = 7  # of an obstacle
+
+
+@dataclass(frozen=True, slots=True)
+class SpatialSensitivity:
+    """Derivatives of an equilibrium, the parameters along the first axis.
+
+    The parameters are the displacements of both pairs of cables [mm], the length of the backbone [mm], then of every
+    obstacle its shift in x, y and z [mm], its turns about the axes x, y and z through its centre [rad] and the growth of
+    its radius [mm]; q = 3 + 7m in all. Where a contact is about to open or close, or a displacement is zero, the
+    derivatives are those of the side on which the active set and the pulled cables stay as they are.
+
+    Attributes:
+        nodes: Of the backbone points, ``(q, n+1, 3)``.
+        turns: Of the disks, as turns about the axes of the base frame, ``(q, n+1, 3)`` [rad per unit].
+        multipliers: Of the multipliers, ``(q, m, p, k)`` [rad²/mm per unit]; zero where nothing touches.
+        tensions: Of the tensions, ``(q, 2)`` [N per unit].
+        forces: Of the force of each obstacle on the robot, ``(q, m, 3)`` [N per unit].
+        displacements: Of how far each obstacle has been pushed, ``(q, m, 3)`` [mm per unit].
+    """
+
+    nodes: np.ndarray
+    turns: np.ndarray
+    multipliers: np.ndarray
+    tensions: np.ndarray
+    forces: np.ndarray
+    displacements: np.ndarray
+
+
+def obstacle_rows(obstacle: int) -> slice:
+    """Rows of a :class:`SpatialSensitivity` that belong to an obstacle: three shifts, three turns, radius."""
+    return slice(3 + MOTIONS * obstacle, 3 + MOTIONS * (obstacle + 1))
+
+
+def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | None = None) -> SpatialSensitivity:
+    """Differentiate an equilibrium with respect to every parameter.
+
+    Args:
+        equilibrium: A stable equilibrium, some cable of it pulled, as a slack robot's shear is not determined.
+        active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier.
+
+    Raises:
+        ValueError: If no cable is pulled, or ``active`` has the wrong shape.
+    """
+    robot, scene = equilibrium.robot, equilibrium.scene
+    if not equilibrium.cables_mm.any():
+        raise ValueError("cables_mm is (0, 0); one must be pulled, for the shear to be determined")
+    change = respond(equilibrium, _kkt_derivatives(robot, scene.laws, scene.mounted), active, [])
+    loads = change.loads
+    loads[LENGTH] -= change.load / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
+    for slopes in (change.unknowns, change.multipliers, loads):
+        for j, obstacle in enumerate(scene):
+            shifts, turns = np.split(slopes[obstacle_rows(j)][:6], 2)
+            turns += np.tensordot(-np.cross(np.eye(3), obstacle.extent.center), shifts, axes=1)
+    forces = loads[:, 3:].reshape(len(loads), len(scene), MOTIONS)[:, :, :3]
+    displacements = np.zeros_like(forces)
+    lines, mounts = np.split(change.unknowns, [9 * robot.segments], axis=1)
+    displacements[:, list(scene.mounted)] = mounts.reshape(len(loads), -1, 3)
+    nodes = np.zeros((3, len(loads), robot.segments + 1, 3))  # of backbone and holes
+    nodes[:, :, 1:] = np.swapaxes(lines.reshape(len(loads), 3, robot.segments, 3), 0, 1)
+    sides = np.where(equilibrium.cables_mm < 0, -1.0, 1.0)
+    return SpatialSensitivity(
+        nodes=nodes[0],
+        turns=_turns(equilibrium, nodes[1:] - nodes[0], sides),
+        multipliers=change.multipliers,
+        tensions=equilibrium.stiffness * sides * loads[:, CABLES],
+        forces=equilibrium.stiffness * forces,
+        displacements=displacements,
+    )
+
+
+def _turns(equilibrium: SpatialEquilibrium, disks: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Turns of the disks from the motion of their holes, ``(q, n+1, 3)``: half the sum of e × δe over their axes."""
+    holes = sides[:, None] * equilibrium.robot.holes[:, :2]
+    first, second = np.tensordot(np.linalg.inv(holes), disks, axes=1)
+    x, y, z = np.moveaxis(equilibrium.frames, 2, 0)
+    third = np.cross(first, y) + np.cross(x, second)
+    return np.asarray((np.cross(x, first) + np.cross(y, second) + np.cross(z, third)) / 2)
+
+
+@lru_cache(maxsize=32)
+def _kkt_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
+    """:func:`~solver.formulation.second_derivatives` of :func:`spatial_problem`."""
+    change = ca.MX.sym("change", 3 + MOTIONS * len(laws))
+    return second_derivatives(spatial_problem(robot, laws, mounted, change), change)

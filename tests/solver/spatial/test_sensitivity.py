@@ -1,0 +1,109 @@
+"""Sensitivities in space against central differences of the solver itself."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Scene
+from solver.spatial import Box, Capsule, Cylinder, HalfSpace, SpatialRobot, SpatialSolver, Sphere
+from solver.spatial.sensitivity import LENGTH, obstacle_rows, spatial_sensitivity
+
+ROBOT = SpatialRobot(length_mm=180, segments=18, offset_mm=8, angle=1.8, max_tension=100, between=1)
+SPRING = ((0.4, 0.1, 0.0), (0.1, 0.2, 0.05), (0.0, 0.05, 0.3))
+PUSHED = [
+    Sphere(center=(40, 18, 104), radius=15),
+    Capsule(start=(38, 30, 100), end=(44, 0, 108), radius=12),
+    Cylinder(start=(30, 35, 100), end=(48, -5, 108), radius=12, edge=3),
+    Box(center=(40, 18, 104), sizes=(26, 30, 28), edge=6, axis=(1, 0.3, 0.2)),
+    HalfSpace(point=(31, 12, 127), normal=(-1, -0.3, 0.2), nodes=(14,)),
+]
+SCENES = [*([o] for o in PUSHED), *([replace(o, stiffness=SPRING)] for o in PUSHED)]
+COMMAND, STEP = np.array([7.0, 3.0]), 1e-4
+
+
+def solve(obstacles, command=COMMAND, length=180.0):
+    solver = SpatialSolver(replace(ROBOT, length_mm=length), Scene(obstacles))
+    equilibrium = solver.rest()
+    for part in np.linspace(0, 1, 31)[1:]:
+        equilibrium = solver.step(equilibrium, part * np.asarray(command))
+    return equilibrium
+
+
+def outputs(equilibrium):
+    parts = (equilibrium.nodes, equilibrium.tensions, equilibrium.forces, equilibrium.displacements)
+    return np.concatenate([*map(np.ravel, parts), 1e3 * equilibrium.multipliers.ravel()])
+
+
+def predicted(slopes, row):
+    parts = (slopes.nodes[row], slopes.tensions[row], slopes.forces[row], slopes.displacements[row])
+    return np.concatenate([*map(np.ravel, parts), 1e3 * slopes.multipliers[row].ravel()])
+
+
+def moved(obstacle, shift=(0, 0, 0), axis=0, turn=0.0, growth=0.0):
+    """The obstacle shifted, turned about an axis through its centre, and grown."""
+    cosine, sine = math.cos(turn), math.sin(turn)
+    rotation = np.eye(3)
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    rotation[[a, a, b, b], [a, b, a, b]] = cosine, -sine, sine, cosine
+    centre = np.array(obstacle.extent.center)
+    place = lambda point: centre + rotation @ (np.array(point) - centre) + shift  # noqa: E731
+    places = {name: place(getattr(obstacle, name)) for name in obstacle.places}
+    match obstacle:
+        case Sphere() | Capsule():
+            return replace(obstacle, **places, radius=obstacle.radius + growth)
+        case Cylinder():
+            longer = growth * np.subtract(places["end"], places["start"]) / math.dist(places["end"], places["start"])
+            ends = {"start": places["start"] - longer, "end": places["end"] + longer}
+            return replace(obstacle, **ends, radius=obstacle.radius + growth, edge=obstacle.edge + growth)
+        case Box():
+            axes = {"axis": rotation @ obstacle.axis, "second": rotation @ obstacle.second}
+            sizes = np.array(obstacle.sizes) + 2 * growth
+            return replace(obstacle, **places, **axes, sizes=sizes, edge=obstacle.edge + growth)
+        case HalfSpace():
+            normal = rotation @ obstacle.normal
+            return replace(obstacle, point=places["point"] + growth * normal, normal=normal)
+
+
+def compare(slopes, row, ahead, behind):
+    assert np.array_equal(ahead.contact, behind.contact)
+    difference = (outputs(ahead) - outputs(behind)) / (2 * STEP)
+    assert predicted(slopes, row) == pytest.approx(difference, rel=1e-5, abs=1e-8 + 1e-5 * np.abs(difference).max())
+    turn = ahead.frames @ np.swapaxes(behind.frames, 1, 2)
+    twisted = (turn - np.swapaxes(turn, 1, 2)) / (4 * STEP)
+    turns = np.stack([twisted[:, 2, 1], twisted[:, 0, 2], twisted[:, 1, 0]], axis=1)
+    assert slopes.turns[row] == pytest.approx(turns, rel=1e-5, abs=1e-8 + 1e-5 * np.abs(turns).max())
+
+
+@pytest.mark.parametrize("obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].stiffness is None else " on a spring"))
+def test_everything(obstacles):
+    equilibrium = solve(obstacles)
+    assert equilibrium.contact.any()
+    slopes = spatial_sensitivity(equilibrium)
+    for row, change in enumerate(STEP * np.eye(2)):
+        compare(slopes, row, solve(obstacles, COMMAND + change), solve(obstacles, COMMAND - change))
+    compare(slopes, LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
+    first = obstacle_rows(0).start
+    motions = [{"shift": tuple(axis)} for axis in np.eye(3)] + [{"axis": k, "turn": 1.0} for k in range(3)] + [{"growth": 1.0}]
+    for row, motion in enumerate(motions):
+        scaled = lambda by: {k: v if k == "axis" else tuple(by * np.array(v)) if k == "shift" else by * v for k, v in motion.items()}  # noqa: E731,B023
+        ahead, behind = (solve([moved(obstacles[0], **scaled(change))]) for change in (STEP, -STEP))
+        compare(slopes, first + row, ahead, behind)
+
+
+def test_opposite_cables():
+    sphere = Sphere(center=(-40, -18, 104), radius=15)
+    equilibrium = solve([sphere], -COMMAND)
+    assert equilibrium.contact.any()
+    slopes = spatial_sensitivity(equilibrium)
+    for row, change in enumerate(STEP * np.eye(2)):
+        compare(slopes, row, solve([sphere], change - COMMAND), solve([sphere], -COMMAND - change))
+
+
+def test_a_slack_robot_is_refused():
+    solver = SpatialSolver(ROBOT, Scene(PUSHED[:1]))
+    with pytest.raises(ValueError, match="one must be pulled"):
+        spatial_sensitivity(solver.rest())
+    with pytest.raises(ValueError, match="active has shape"):
+        spatial_sensitivity(solver.step(solver.rest(), (1.0, 0.0)), np.ones((1, 2, 19), bool))
