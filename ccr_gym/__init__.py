@@ -3,8 +3,8 @@
 from ccr_gym.env import ContactEnv
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
-from ccr_gym.settings import Settings
-from ccr_gym.tasks import LoadCell, PushObstacle, Task
+from ccr_gym.settings import Settings, SpatialSettings
+from ccr_gym.tasks import LoadCell, PushObstacle, SpatialPush, Task
 from ccr_gym.vector_env import ContactVectorEnv
 
 __all__ = [
@@ -15,6 +15,8 @@ __all__ = [
     "PushObstacle",
     "RewardWeights",
     "Settings",
+    "SpatialPush",
+    "SpatialSettings",
     "Task",
 ]
 __version__ = "0.1.0"

@@ -9,13 +9,14 @@ from gymnasium import spaces
 
 from ccr_gym.fleet import Fleet, Reading
 from ccr_gym.observation import FORCE_SCALE_N
-from ccr_gym.rendering import Frame, Renderer
+from ccr_gym.rendering import Frame, Renderer, draw_plane
 from ccr_gym.reward import TERMS
 from ccr_gym.settings import Settings, require
+from ccr_gym.spatial_rendering import draw_space
 from ccr_gym.tasks import Assignment, Task
-from solver import Equilibrium
 
 Observation = np.ndarray | dict[str, np.ndarray]
+WORLDS = {2: draw_plane, 3: draw_space}
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
 
 
@@ -38,7 +39,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             render_mode is None or render_mode in self.metadata["render_modes"],
             f"render_mode is {render_mode!r}; it must be None or one of {self.metadata['render_modes']}",
         )
-        self.task, self.settings, self.render_mode = task, Settings(**settings), render_mode
+        self.task, self.settings, self.render_mode = task, task.body.settings(**settings), render_mode
         self._fleet = Fleet(task, self.settings, 1)
         self._renderer: Renderer | None = None
         self._started = False
@@ -51,14 +52,15 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
         Args:
             seed: Seeds the environment's generator.
-            options: ``{"scene": Scene, "desired_force": float}`` fixes the assignment instead of drawing it [N].
+            options: ``{"scene": Scene, "desired_force": float}`` fixes the assignment instead of drawing it [N]; the
+                force is a vector where the task asks for one.
 
         Raises:
             ValueError: If the options are incomplete or out of range.
         """
         super().reset(seed=seed)
         if options:
-            self._fleet.give(0, _assignment(options))
+            self._fleet.give(0, _assignment(options, self.task))
         else:
             self._fleet.draw([0], [self.np_random])
         self._started = True
@@ -77,10 +79,10 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         if not self._started:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         pull = np.asarray(action)
-        if pull.shape != (1,) or not math.isfinite(pull[0]):
-            raise ValueError(f"action is {action!r}; it must be one finite number in an array of shape (1,)")
+        if pull.shape != self.action_space.shape or not all(map(math.isfinite, pull)):
+            raise ValueError(f"action is {action!r}; it must be finite numbers of shape {self.action_space.shape}")
         fleet = self._fleet
-        fleet.step(min(max(float(pull[0]), -1.0), 1.0), 0)
+        fleet.step(fleet.body.effort(pull), 0)
         reading = fleet.read(0)
         terms = tuple(map(float, fleet.rewards(reading, 0)))
         if self.render_mode == "human":
@@ -92,7 +94,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         if self.render_mode is None or not self._started:
             gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human', and a reset")
             return None
-        self._renderer = self._renderer or Renderer(self.metadata["render_fps"])
+        self._renderer = self._renderer or Renderer(self.metadata["render_fps"], WORLDS[self.task.body.model.space])
         reading = self._fleet.read(0)
         frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, FORCE_SCALE_N)
         if self.render_mode == "rgb_array":
@@ -107,26 +109,31 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             self._renderer = None
 
     @property
-    def equilibrium(self) -> Equilibrium:
+    def equilibrium(self) -> Any:
         """The present equilibrium; immutable."""
         return self._fleet.equilibrium(0)
 
     def _observation(self, reading: Reading) -> Observation:
-        row = self._fleet.observe(reading)
+        row = self._fleet.observe(reading, 0)
         return row if self.settings.obs_mode == "flat" else self._fleet.observer.entries(row)
 
 
 def single_spaces(fleet: Fleet, settings: Settings) -> tuple[spaces.Space[Any], spaces.Box]:
     """Spaces of what one environment shows and takes."""
     flat = settings.obs_mode == "flat"
-    return fleet.observer.flat_space if flat else fleet.observer.dict_space, spaces.Box(-1.0, 1.0, (1,), np.float32)
+    return fleet.observer.flat_space if flat else fleet.observer.dict_space, spaces.Box(
+        -1.0, 1.0, (fleet.body.model.cables,), np.float32
+    )
 
 
-def _assignment(options: dict[str, Any]) -> Assignment:
+def _assignment(options: dict[str, Any], task: Task) -> Assignment:
     require(
         options.keys() == {"scene", "desired_force"},
         f"options has {sorted(options)}; give both 'scene' and 'desired_force', or neither",
     )
-    force = options["desired_force"]
-    require(0 < force <= FORCE_SCALE_N, f"desired_force is {force}; it must be positive and at most {FORCE_SCALE_N}")
-    return Assignment(options["scene"], float(force))
+    force = np.array(options["desired_force"], float)
+    shape = (task.body.model.space,) if task.force_vector else ()
+    require(force.shape == shape, f"desired_force is {force}; it must have the shape {shape}")
+    size = float(np.linalg.norm(force)) if shape else float(force)
+    require(0 < size <= FORCE_SCALE_N, f"desired_force is {force}; it must be positive and at most {FORCE_SCALE_N}")
+    return Assignment(options["scene"], force)

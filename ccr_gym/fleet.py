@@ -8,18 +8,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ccr_gym.bodies import Which, plain
 from ccr_gym.observation import Observer
 from ccr_gym.reward import TERMS, reward_terms
 from ccr_gym.settings import Settings, require
 from ccr_gym.tasks import Assignment, Task, assign
-from solver import Equilibrium, Solver
-from solver.batch import BatchSolver, ReferenceBatch
-from solver.forces import virtual_work
-from solver.layout import CABLE, TENSION
-from solver.operations import ARRAYS, NUMBERS, Operations
+from solver.layout import SPACE
+from solver.solve import Solver
+from solver.spatial import SpatialSolver
 
 ALL = slice(None)
-Which = int | slice | list[int]
 
 
 class Reading(NamedTuple):
@@ -27,10 +25,13 @@ class Reading(NamedTuple):
 
     Attributes:
         blocks: Their equilibria, ``(..., size)``.
-        force_true: Contact force on the robot, ``(..., 2)`` [N].
-        force_est: The same by virtual work, ``(..., 2)`` [N].
+        force_true: Contact force on the robot, ``(..., d)`` [N].
+        force_est: The same by virtual work, ``(..., d)`` [N].
         force: Magnitude of the true one [N].
-        desired: Set-point [N].
+        desired: Magnitude of the set-point [N].
+        goal: The set-point, its magnitude or ``(..., d)`` [N].
+        lacking: Set-point minus measured, of magnitudes or ``(..., d)`` [N].
+        error: Relative force error.
     """
 
     blocks: np.ndarray
@@ -38,20 +39,9 @@ class Reading(NamedTuple):
     force_est: np.ndarray
     force: Any
     desired: Any
-
-
-def _operations(which: Which) -> Operations:
-    return NUMBERS if isinstance(which, int) else ARRAYS
-
-
-def _columns(values: np.ndarray, which: Which) -> Any:
-    """The numbers of one robot, or those of many as arrays, each over all of them."""
-    return values.tolist() if isinstance(which, int) else values.T
-
-
-def _plain(value: Any, which: Which) -> Any:
-    """A number of one robot as Python's own, those of many as an array of their own."""
-    return value.item() if isinstance(which, int) else value.copy()
+    goal: Any
+    lacking: Any
+    error: Any
 
 
 class Fleet:
@@ -65,97 +55,111 @@ class Fleet:
     """
 
     def __init__(self, task: Task, settings: Settings, count: int, threads: int = 1) -> None:
-        self._task, self._settings = task, settings
+        self._task, self._settings, self.body = task, settings, task.body
         self.count, self._threads = count, threads
+        space, cables = self.body.model.space, self.body.model.cables
         self.desired = np.ones(count)
-        self._effort = np.zeros(count)
+        self._goals = np.ones((count, space))  # set-points that are vectors
+        self._effort = np.zeros(count) if cables == 1 else np.zeros((count, cables))
+        self._seen = np.zeros((count, self.body.obstacle_size))
         self._enter(task.obstacles)
 
     def _enter(self, obstacles: int) -> None:
         """Make room for scenes of so many obstacles."""
-        settings = self._settings
-        solver = ReferenceBatch if settings.backend == "casadi" else BatchSolver
-        self.solver = solver(settings.robot, self.count, obstacles, self._threads)
+        self.solver = self.body.batch(self._settings, self.count, obstacles, self._threads)
         self._layout = self.solver.layout
-        self.observer = Observer(settings.robot, self._layout, settings.force_sensor, settings.cable_limit_mm)
+        self.observer = Observer(self.body, self._settings, self._layout, self._task.force_vector)
 
     def draw(self, robots: Sequence[int], generators: Sequence[np.random.Generator]) -> None:
         """Start new episodes of some robots, each drawn by its own generator."""
-        settings = self._settings
-        assign(self._task, self.solver, robots, generators, settings.cable_limit_mm, self.desired)
-        self._begin(robots)
+        forces = assign(self._task, self.solver, robots, generators, self._settings.cable_limit_mm)
+        self._aim(robots, forces)
 
     def give(self, robot: int, assignment: Assignment) -> None:
         """Start a given episode of a robot.
 
         Raises:
-            ValueError: As :class:`solver.Solver`; the episode goes on as it was.
+            ValueError: As the solver; the episode goes on as it was.
         """
-        Solver(self._settings.robot, assignment.scene)
+        solver: Any = SpatialSolver if self.body.model is SPACE else Solver
+        solver(self._settings.robot, assignment.scene)
         if len(assignment.scene) != self._layout.obstacles:
             require(self.count == 1, f"all scenes of several robots must have {self._layout.obstacles} obstacles")
             self._enter(len(assignment.scene))
         self.solver.assign(robot, assignment.scene)
-        self.desired[robot] = assignment.desired_force
-        self._begin([robot])
+        self._aim([robot], np.atleast_2d(assignment.desired_force))
 
-    def _begin(self, robots: Sequence[int]) -> None:
+    def _aim(self, robots: Sequence[int], forces: np.ndarray) -> None:
+        """Begin episodes with set-points, magnitudes ``(k, 1)`` or vectors ``(k, d)`` [N]."""
+        self.desired[robots] = forces[:, 0]
+        if self._task.force_vector:
+            self._goals[robots] = forces
+            self.desired[robots] = _norm(forces)
         self.solver.rest(robots)
         self._effort[robots] = 0.0
+        for robot in robots if self.body.obstacle_size else ():
+            self._seen[robot] = self.body.obstacle(self.solver.scene(robot))
 
     def step(self, effort: Any, which: Which = ALL) -> None:
         """Move the cables of all robots, or of some, by ``effort · max_increment_mm``.
 
         Args:
-            effort: Normalised cable increments in [−1, 1] of these robots, a number or ``(k,)``.
+            effort: Normalised cable increments of these robots, as :meth:`ccr_gym.bodies.Body.effort` gives them.
             which: One robot, a list of them, or all.
         """
-        settings, (minimum, maximum, _) = self._settings, _operations(which)
-        command = self.solver.blocks[which, CABLE] + effort * settings.max_increment_mm
-        self.solver.commands[which, CABLE] = minimum(maximum(command, 0.0), settings.cable_limit_mm)
+        body, solver = self.body, self.solver
+        solver.commands[which, body.place] = body.command(solver.blocks, effort, which, self._settings)
         self._effort[which] = effort
-        self.solver.move(which)
+        solver.move(which)
 
     def read(self, which: int | slice = ALL) -> Reading:
         """What one robot or all of them feel now."""
-        layout, settings, blocks = self._layout, self._settings, self.solver.blocks[which]
-        force_true = layout.force(blocks).copy()
-        force = _plain(np.hypot(force_true[..., 0], force_true[..., 1]), which)
-        force_est = np.zeros(force_true.shape)
-        if force > 0 if isinstance(which, int) else force.any():
-            normal_x, normal_y = _columns(force_true, which)
-            x, y = normal_x - settings.friction * normal_y, normal_y + settings.friction * normal_x
-            slopes = _columns(layout.tip_slopes(blocks), which)
-            load = _plain(blocks[..., TENSION] - layout.onset(blocks)[..., 0], which)
-            ratio = virtual_work(x, y, load, slopes, settings.robot.offset_mm, _operations(which))
-            force_est[..., 0], force_est[..., 1] = ratio * x, ratio * y
-        return Reading(blocks, force_true, force_est, force, _plain(self.desired[which], which))
+        blocks = self.solver.blocks[which]
+        force_true = self._layout.force(blocks).copy()
+        force, desired = plain(_norm(force_true), which), plain(self.desired[which], which)
+        force_est = self.body.estimate(blocks, self._layout, force_true, which, self._settings)
+        if self._task.force_vector:
+            goal = self._goals[which].copy()
+            lacking = goal - force_true
+            error = plain(_norm(lacking), which) / desired
+        else:
+            goal, lacking = desired, desired - force
+            error = abs(lacking) / desired
+        return Reading(blocks, force_true, force_est, force, desired, goal, lacking, error)
 
-    def observe(self, reading: Reading) -> np.ndarray:
+    def observe(self, reading: Reading, which: int | slice = ALL) -> np.ndarray:
         """What is seen, in the flat form, ``(k,)`` or ``(N, k)`` float32."""
-        return self.observer.flat(reading.blocks, reading.force, reading.force_est, reading.desired)
+        told = {"desired_force": reading.goal, "force_error": reading.lacking, "force_est": reading.force_est}
+        return self.observer.flat(reading.blocks, told, self._seen[which])
 
     def rewards(self, reading: Reading, which: int | slice = ALL) -> tuple[Any, ...]:
         """Terms of the reward of the last step."""
-        clearance = _plain(reading.blocks[..., self._layout.clearance_at], which)
-        told = clearance, _plain(self._effort[which], which)
-        return reward_terms(self._settings.weights, reading.force, reading.desired, *told, _operations(which))
+        clearance = plain(reading.blocks[..., self._layout.clearance_at], which)
+        effort = self.body.square(plain(self._effort[which], which) if self._effort.ndim == 1 else self._effort[which])
+        operations = self.body.operations(which)
+        weights, force, desired = self._settings.weights, reading.force, reading.desired
+        return reward_terms(weights, force, desired, reading.error, clearance, effort, operations)
 
     def infos(self, reading: Reading, terms: tuple[Any, ...], which: int | slice = ALL) -> dict[str, Any]:
         """What is told beside the observation, a plain number for one robot and an array for many."""
-        blocks, force_true, force_est, force, desired = reading
         return {
-            "force_true": force_true,
-            "force_est": force_est,
-            "desired_force": desired,
-            "cable_mm": _plain(blocks[..., CABLE], which),
-            "tension": _plain(blocks[..., TENSION], which),
-            "solver_status": _plain(self.solver.statuses[which], which),
-            "cost": _operations(which).maximum(0.0, force - self._settings.force_limit),
-            "is_success": abs(force - desired) <= 0.05 * desired,
+            "force_true": reading.force_true,
+            "force_est": reading.force_est,
+            "desired_force": reading.goal,
+            **self.body.told(reading.blocks, which),
+            "solver_status": plain(self.solver.statuses[which], which),
+            "cost": self.body.operations(which).maximum(0.0, reading.force - self._settings.force_limit),
+            "is_success": reading.error <= 0.05,
             "reward_terms": dict(zip(TERMS, terms, strict=True)),
         }
 
-    def equilibrium(self, robot: int) -> Equilibrium:
+    def equilibrium(self, robot: int) -> Any:
         """A robot's present equilibrium; immutable."""
         return self.solver.equilibrium(robot)
+
+
+def _norm(forces: np.ndarray) -> Any:
+    """Magnitudes of forces ``(..., d)``."""
+    if forces.shape[-1] == 2:
+        return np.hypot(forces[..., 0], forces[..., 1])
+    return np.sqrt(forces[..., 0] ** 2 + forces[..., 1] ** 2 + forces[..., 2] ** 2)

@@ -5,76 +5,72 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from solver import Robot
-from solver.layout import CABLE, Layout
+from ccr_gym.bodies import Body, Seen
+from ccr_gym.settings import Settings
+from solver.layout import Layout
 
 FORCE_SCALE_N = 0.5  # force that an observation of 1 stands for
 SENSOR_KEYS = ("force_error", "force_measured")  # seen with a force sensor only
-
-
-def dict_space(robot: Robot, force_sensor: bool) -> spaces.Dict:
-    """The dictionary of what is seen; keys stand in the alphabetical order of the flat form."""
-    nodes = robot.segments + 1
-    entries: dict[str, spaces.Space[np.ndarray]] = {
-        "cable": _box(0, (1,)),
-        "contact": _box(0, (len(robot.touch) * robot.positions,)),
-        "desired_force": _box(0, (1,)),
-        "force_error": _box(-1, (1,)),
-        "force_est": _box(-1, (2,)),
-        "force_measured": _box(-1, (2,)),
-        "nodes": _box(-1, (3 * nodes,)),
-    }
-    return spaces.Dict({key: entry for key, entry in entries.items() if force_sensor or key not in SENSOR_KEYS})
 
 
 class Observer:
     """Writes what is seen as scaled float32 rows within the bounds of their space.
 
     Args:
-        robot: The robot.
-        layout: Where its numbers stand in a block.
-        force_sensor: Whether the measured force is seen.
-        cable_limit_mm: Full scale of the cable displacement [mm].
+        body: The model of the robot.
+        settings: What the environment was told.
+        layout: Where the numbers of an equilibrium stand in its block.
+        force_vector: Whether the set-point is a vector.
     """
 
-    def __init__(self, robot: Robot, layout: Layout, force_sensor: bool, cable_limit_mm: float) -> None:
-        self.dict_space = dict_space(robot, force_sensor)
+    def __init__(self, body: Body, settings: Settings, layout: Layout, force_vector: bool) -> None:
+        numbers, space = np.arange(layout.size), body.model.space
+        goal = space if force_vector else 1
+        signed = -1.0 if body.model.cables > 1 else 0.0
+        seen: Seen = {  # what is a number of the block, and its scale
+            "cable": (layout.cables(numbers), 1 / settings.cable_limit_mm),
+            "contact": (layout.flags(numbers), 1.0),
+            "force_measured": (layout.force(numbers), 1 / FORCE_SCALE_N),
+            **body.poses(settings.robot, layout),
+        }
+        told = {"desired_force": goal, "force_error": goal, "force_est": space}
+        if body.obstacle_size:
+            told["obstacle"] = body.obstacle_size
+        lowest = {"cable": signed, "contact": 0.0, "desired_force": 0.0 if goal == 1 else -1.0}
+        sizes = {key: source.size for key, (source, _) in seen.items()} | told
+        keys = [key for key in sorted(sizes) if settings.force_sensor or key not in SENSOR_KEYS]
+        self.dict_space = spaces.Dict({key: _box(lowest.get(key, -1.0), (sizes[key],)) for key in keys})
         boxes = [box for box in self.dict_space.values() if isinstance(box, spaces.Box)]
         self._low, self._high = (np.concatenate([getattr(box, end) for box in boxes]) for end in ("low", "high"))
         self.flat_space = spaces.Box(self._low, self._high)
-        ends = np.cumsum([box.shape[0] for box in boxes]).tolist()
-        self._places = {
-            key: slice(end - box.shape[0], end) for key, box, end in zip(self.dict_space, boxes, ends, strict=True)
-        }
-        numbers = np.arange(layout.size)
-        pose_scale = 1 / np.array([robot.lengths_mm[1], robot.lengths_mm[1], np.pi])
-        seen: dict[str, tuple[np.ndarray, np.ndarray | float]] = {  # what is a number of the block, and its scale
-            "cable": (numbers[[CABLE]], 1 / cable_limit_mm),
-            "contact": (layout.flags(numbers), 1.0),
-            "force_measured": (layout.force(numbers), 1 / FORCE_SCALE_N),
-            "nodes": (layout.nodes(numbers).ravel(), np.tile(pose_scale, robot.segments + 1)),
+        ends = np.cumsum([sizes[key] for key in keys]).tolist()
+        self._places = {key: slice(end - sizes[key], end) for key, end in zip(keys, ends, strict=True)}
+        # Numbers that stand alone are put in their place without an axis.
+        self._told = {
+            key: self._places[key] if told[key] > 1 else self._places[key].start for key in told if key in keys
         }
         self._source, self._scale = np.zeros(self._low.size, int), np.zeros(self._low.size)
-        for key, (source, scale) in seen.items():
-            if key in self._places:
-                self._source[self._places[key]], self._scale[self._places[key]] = source, scale
-        self._force_sensor = force_sensor
+        for key in seen.keys() & keys:
+            source, scale = seen[key]
+            self._source[self._places[key]], self._scale[self._places[key]] = source.ravel(), scale
+        self._obstacle_scale = np.ones(body.obstacle_size)
+        self._obstacle_scale[:3] = 1 / settings.robot.length_mm
 
-    def flat(self, blocks: np.ndarray, force: Any, force_est: np.ndarray, desired: Any) -> np.ndarray:
+    def flat(self, blocks: np.ndarray, told: dict[str, Any], obstacle: np.ndarray) -> np.ndarray:
         """The flat form of one robot, ``(k,)`` float32, or of many, ``(N, k)``.
 
         Args:
             blocks: Equilibrium, ``(size,)`` or ``(N, size)``.
-            force: Magnitude of the measured force [N].
-            force_est: Estimated force on the robot, ``(..., 2)`` [N].
-            desired: Set-point [N].
+            told: Forces [N]: set-point, set-point minus measured, and estimate; numbers or ``(..., d)``.
+            obstacle: What is seen of the obstacle, ``(..., o)``.
         """
-        rows, at = blocks[:, self._source] if blocks.ndim > 1 else blocks.take(self._source), self._places
+        rows = blocks[:, self._source] if blocks.ndim > 1 else blocks.take(self._source)
         rows *= self._scale
-        rows[..., at["desired_force"].start] = desired / FORCE_SCALE_N
-        rows[..., at["force_est"]] = force_est / FORCE_SCALE_N
-        if self._force_sensor:
-            rows[..., at["force_error"].start] = (desired - force) / FORCE_SCALE_N
+        for key, force in told.items():
+            if key in self._told:
+                rows[..., self._told[key]] = force / FORCE_SCALE_N
+        if "obstacle" in self._told:
+            rows[..., self._told["obstacle"]] = obstacle * self._obstacle_scale
         np.maximum(rows, self._low, out=rows)
         np.minimum(rows, self._high, out=rows)
         return rows.astype(np.float32)

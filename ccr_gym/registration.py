@@ -7,6 +7,7 @@ MAX_EPISODE_STEPS = 64
 ENV_IDS = {
     "CCR/LoadCell-v0": "ccr_gym.environments:LoadCell",
     "CCR/PushObstacle-v0": "ccr_gym.environments:PushObstacle",
+    "CCR/SpatialPush-v0": "ccr_gym.environments:SpatialPush",
 }
 
 

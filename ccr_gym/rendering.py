@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import ModuleType
@@ -105,13 +105,13 @@ class Frame:
 
     Attributes:
         equilibrium: The robot among its obstacles.
-        force_true: Contact force on the robot by energy, base frame, ``(2,)`` [N].
-        force_est: Contact force on the robot as estimated, base frame, ``(2,)`` [N].
+        force_true: Contact force on the robot by energy, base frame, ``(d,)`` [N].
+        force_est: Contact force on the robot as estimated, base frame, ``(d,)`` [N].
         desired_force: Set-point of the force's magnitude [N].
         force_scale: Magnitude at which gauge and arrows have their full length, positive [N].
     """
 
-    equilibrium: Equilibrium
+    equilibrium: Any
     force_true: np.ndarray
     force_est: np.ndarray
     desired_force: float
@@ -123,14 +123,21 @@ class Renderer:
 
     Args:
         fps: Frames a second that :meth:`show` keeps to.
+        draw_world: What draws the robot and its obstacles; ``None`` for those of the plane.
         size: Width and height of the picture [px].
 
     Raises:
         DependencyNotInstalled: If pygame is missing.
     """
 
-    def __init__(self, fps: int, size: tuple[int, int] = (640, 640)) -> None:
+    def __init__(
+        self,
+        fps: int,
+        draw_world: "Callable[[Canvas, Frame], None] | None" = None,
+        size: tuple[int, int] = (640, 640),
+    ) -> None:
         self._pygame = import_pygame()
+        self._draw_world = draw_world or draw_plane
         self._fps = fps
         self._size = size
         self._window: pygame.Surface | None = None
@@ -166,7 +173,7 @@ class Renderer:
 
     def _picture(self, frame: Frame) -> "pygame.Surface":
         canvas = Canvas(self._pygame, self._size)
-        draw_world(canvas, frame)
+        self._draw_world(canvas, frame)
         draw_gauge(canvas, frame)
         draw_footer(canvas, frame.equilibrium)
         return canvas.finish()
@@ -290,8 +297,8 @@ class Camera(NamedTuple):
         return np.asarray(points, dtype=float) * (self.scale, -self.scale) + (self.x, self.y)
 
 
-def draw_world(canvas: Canvas, frame: Frame) -> None:
-    """Everything left of the gauge and above the footer."""
+def draw_plane(canvas: Canvas, frame: Frame) -> None:
+    """Everything left of the gauge and above the footer, in the plane."""
     equilibrium = frame.equilibrium
     draw_grid(canvas)
     for obstacle in equilibrium.scene_now:
@@ -427,11 +434,15 @@ def draw_forces(canvas: Canvas, frame: Frame) -> None:
 
 def arrow_of(camera: Camera, force: np.ndarray, full_scale: float) -> np.ndarray:
     """Canvas vector of the reaction to a force on the robot, limited in length, zero for a force that is not finite."""
-    size = float(np.hypot(*force))
+    return limited(force, full_scale) * (-LAYOUT.arrow_mm * camera.scale, LAYOUT.arrow_mm * camera.scale)
+
+
+def limited(force: np.ndarray, full_scale: float) -> np.ndarray:
+    """A force over the full scale, limited in size, zero for one that is not finite."""
+    size = float(np.linalg.norm(force))
     if not (math.isfinite(size) and size > 0):
-        return np.zeros(2)
-    length = min(size / full_scale, LAYOUT.arrow_reach) * LAYOUT.arrow_mm * camera.scale
-    return np.array([-force[0], force[1]]) * (length / size)
+        return np.zeros_like(force)
+    return np.asarray(force * (min(size / full_scale, LAYOUT.arrow_reach) / size))
 
 
 def draw_arrow(canvas: Canvas, start: ArrayLike, vector: np.ndarray, width: float, color: Color) -> None:
@@ -471,8 +482,8 @@ def draw_gauge(canvas: Canvas, frame: Frame) -> None:
     top = LAYOUT.margin + 32
     draw_gauge_scale(canvas, frame.force_scale, top)
     readings = (
-        ("true", float(np.hypot(*frame.force_true)), PALETTE.force_true),
-        ("est.", float(np.hypot(*frame.force_est)), PALETTE.force_est),
+        ("true", float(np.linalg.norm(frame.force_true)), PALETTE.force_true),
+        ("est.", float(np.linalg.norm(frame.force_est)), PALETTE.force_est),
         ("goal", frame.desired_force, PALETTE.desired),
     )
     draw_gauge_readings(canvas, readings, frame.force_scale, top)
@@ -508,13 +519,17 @@ def draw_gauge_readings(
     canvas.polygon([(right + 2, y), (right + 11, y - 6), (right + 11, y + 6)], readings[-1][2])
 
 
-def draw_footer(canvas: Canvas, equilibrium: Equilibrium) -> None:
+def draw_footer(canvas: Canvas, equilibrium: Any) -> None:
     """The line at the bottom: cable, tension and the solver's verdict."""
     top = canvas.height - LAYOUT.footer
     canvas.box(0, top, canvas.width, LAYOUT.footer, PALETTE.panel)
     canvas.box(0, top, canvas.width, 1, PALETTE.border)
     y, color = top + 0.5 * LAYOUT.footer, STATUS_COLORS[equilibrium.status]
-    canvas.label(f"cable {equilibrium.cable_mm:.2f} mm", (LAYOUT.margin, y), PALETTE.ink)
-    canvas.label(f"tension {equilibrium.tension:.2f} N", (LAYOUT.margin + 150, y), PALETTE.ink)
-    canvas.disc((LAYOUT.margin + 300, y), 4, color)
-    canvas.label(equilibrium.status.name.lower(), (LAYOUT.margin + 312, y), color)
+    in_plane = isinstance(equilibrium, Equilibrium)
+    cables = [equilibrium.cable_mm] if in_plane else equilibrium.cables_mm
+    tensions = [equilibrium.tension] if in_plane else equilibrium.tensions
+    shift = 150 + 45 * (len(cables) - 1)
+    canvas.label(f"cable {', '.join(f'{cable:.2f}' for cable in cables)} mm", (LAYOUT.margin, y), PALETTE.ink)
+    canvas.label(f"tension {', '.join(f'{t:.2f}' for t in tensions)} N", (LAYOUT.margin + shift, y), PALETTE.ink)
+    canvas.disc((LAYOUT.margin + 2 * shift, y), 4, color)
+    canvas.label(equilibrium.status.name.lower(), (LAYOUT.margin + 2 * shift + 12, y), color)

@@ -13,7 +13,7 @@ class RewardWeights:
     """Weights of the reward terms, all of which are at most 0 but ``accuracy``.
 
     Attributes:
-        force_error: Relative force error ``|F − F_d| / F_d``, counted up to 1.
+        force_error: Relative force error ``|F − F_d| / F_d``, of magnitudes or vectors, counted up to 1.
         accuracy: Nearness to the set-point, ``exp(−error / 5 %)``, in [0, 1].
         overshoot: Relative force above the set-point, counted up to 1.
         approach: Clearance per 100 mm while nothing touches.
@@ -31,25 +31,25 @@ TERMS = tuple(field.name for field in fields(RewardWeights))
 
 
 def reward_terms(
-    weights: RewardWeights, force: Any, desired: Any, clearance: Any, action: Any, operations: Operations
+    weights: RewardWeights, force: Any, desired: Any, error: Any, clearance: Any, effort: Any, operations: Operations
 ) -> tuple[Any, ...]:
     """Weighted terms in the order of :data:`TERMS`, whose sum is the reward: five numbers, or arrays ``(N,)``.
 
     Args:
         weights: Their weights.
         force: Magnitude of the contact force, zero where nothing touches [N].
-        desired: Desired force [N].
+        desired: Magnitude of the desired force [N].
+        error: Relative force error.
         clearance: Smallest gap [mm].
-        action: Normalised cable increment in [−1, 1].
+        effort: Mean square of the normalised cable increments.
         operations: Those of numbers or those of arrays, as the others are.
     """
     minimum, maximum, where = operations
     excess = force / desired - 1.0
-    error = abs(excess)
     return (
         -weights.force_error * minimum(error, 1.0),
         weights.accuracy * np.exp(-20.0 * error),
         -weights.overshoot * minimum(maximum(excess, 0.0), 1.0),
         -weights.approach * where(force > 0, 0.0, minimum(maximum(clearance, 0.0) / 100.0, 1.0)),
-        -weights.effort * (action * action),
+        -weights.effort * effort,
     )

@@ -1,10 +1,11 @@
 """What an environment is told when it is made, checked once."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from ccr_gym.reward import RewardWeights
 from solver import Robot
+from solver.spatial import SpatialRobot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +27,9 @@ class Settings:
         ValueError: If an argument is out of range; the message names the bound.
     """
 
-    robot: Robot = field(default_factory=Robot.prototype)
+    kind: ClassVar[type[Any]] = Robot  # of the robot
+
+    robot: Any = field(default_factory=Robot.prototype)
     obs_mode: Literal["dict", "flat"] = "dict"
     force_sensor: bool = True
     max_increment_mm: float = 0.5
@@ -39,7 +42,7 @@ class Settings:
     def __post_init__(self) -> None:
         given: Any = self.robot
         if given is None or isinstance(given, dict):
-            object.__setattr__(self, "robot", Robot(**given) if given else Robot.prototype())
+            object.__setattr__(self, "robot", self.kind(**given) if given else self.kind.prototype())
         given = self.weights
         if given is None or isinstance(given, dict):
             object.__setattr__(self, "weights", RewardWeights(**(given or {})))
@@ -54,6 +57,27 @@ class Settings:
             f"max_increment_mm is {self.max_increment_mm}; it must be positive and at most cable_limit_mm",
         )
         require(self.force_limit > 0, f"force_limit is {self.force_limit}; it must be positive")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpatialSettings(Settings):
+    """The same in space.
+
+    Attributes:
+        robot: A :class:`solver.spatial.SpatialRobot`, or a mapping of its fields; the paper's prototype with a second
+            cable by default.
+        cable_limit_mm: Largest cable displacement a policy can command, either way [mm].
+        backend: ``"native"``; the reference solver tells too little in space.
+    """
+
+    kind: ClassVar[type[Any]] = SpatialRobot
+
+    robot: Any = field(default_factory=SpatialRobot.prototype)
+    cable_limit_mm: float = 10.0
+
+    def __post_init__(self) -> None:
+        Settings.__post_init__(self)
+        require(self.backend == "native", f"backend is {self.backend!r}; in space it must be 'native'")
 
 
 def require(condition: bool, message: str) -> None:

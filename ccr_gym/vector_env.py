@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from ccr_gym.env import METADATA, Observation, single_spaces
 from ccr_gym.fleet import Fleet
 from ccr_gym.reward import TERMS
-from ccr_gym.settings import Settings, require
+from ccr_gym.settings import require
 from ccr_gym.tasks import Task
 
 Infos = dict[str, Any]
@@ -45,7 +45,7 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         **settings: Any,
     ) -> None:
         require(max_episode_steps > 0, f"max_episode_steps is {max_episode_steps}; it must be positive")
-        self.task, self.settings, self.num_envs = task, Settings(**settings), num_envs
+        self.task, self.settings, self.num_envs = task, task.body.settings(**settings), num_envs
         self.max_episode_steps = max_episode_steps
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
@@ -101,9 +101,10 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         if not self._started or (disabled and self._ended.any()):
             raise gymnasium.error.ResetNeeded("call reset() before step(), with a reset_mask after the end of episodes")
         pulls = np.asarray(actions, dtype=float)
-        if pulls.shape != (self.num_envs, 1) or not np.isfinite(pulls).all():
-            raise ValueError(f"actions is {actions!r}; it must be finite numbers of shape ({self.num_envs}, 1)")
-        effort = np.minimum(np.maximum(pulls[:, 0], -1.0), 1.0)
+        shape = self.action_space.shape
+        if pulls.shape != shape or not np.isfinite(pulls).all():
+            raise ValueError(f"actions is {actions!r}; it must be finite numbers of shape {shape}")
+        effort = self._fleet.body.effort(pulls)
         resetting, everything = self._ended.copy(), np.ones(self.num_envs, bool)
         if resetting.any():
             moving = np.flatnonzero(~resetting)

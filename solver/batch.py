@@ -117,8 +117,8 @@ class BaseBatch(ABC):
         increment_mm: float,
         limit_mm: float,
         directions: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Whether pulling some robots steadily from rest gets each to a contact force, ``(k,)`` bool.
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Whether pulling some robots steadily from rest gets each to a contact force, and the force it gets to.
 
         No step may end in anything but ``CONVERGED``, and the straight robot must be clear of the obstacles.
 
@@ -128,17 +128,31 @@ class BaseBatch(ABC):
             increment_mm: Cable displacement of a step [mm].
             limit_mm: Bound on the cable displacement [mm].
             directions: Displacements of the cables per millimetre of pull, ``(k, cables)``; ``None`` for ones.
+
+        Returns:
+            ``(k,)`` bool, and the contact force on each robot at the end of its pull, ``(k, d)`` [N].
         """
         forces = np.asarray(forces, float)
         directions = np.ones((len(forces), self.model.cables)) if directions is None else directions
         length = self.robot.length_mm
-        return np.array(self._fleet.reaches(list(robots), forces, directions, increment_mm, limit_mm, length), bool)
+        reached = np.zeros((len(forces), self.model.space))
+        found = self._fleet.reaches(list(robots), forces, directions, increment_mm, limit_mm, length, reached)
+        return np.array(found, bool), reached
 
-    def equilibrium(self, index: int) -> Any:
-        """A robot's present equilibrium, on its own."""
+    def scene(self, index: int) -> Scene:
+        """The obstacles a robot is among.
+
+        Raises:
+            ValueError: If it has not been assigned to a scene.
+        """
         scene = self._scenes[index]
         if scene is None:
             raise ValueError(f"robot {index} has not been assigned to a scene")
+        return scene
+
+    def equilibrium(self, index: int) -> Any:
+        """A robot's present equilibrium, on its own."""
+        scene = self.scene(index)
         status, iterations = Status(self.statuses[index]), int(self.iterations[index])
         return self._make_equilibrium(scene, self.blocks[index].copy(), status, iterations)
 

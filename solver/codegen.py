@@ -6,7 +6,10 @@ from types import ModuleType
 
 import casadi as ca
 
-for name, folder in (("solver", "."), ("solver.spatial", "spatial")):  # packages that need the kernel that is being built
+for name, folder in (
+    ("solver", "."),
+    ("solver.spatial", "spatial"),
+):  # packages that need the kernel that is being built
     sys.modules[name] = package = ModuleType(name)
     package.__path__ = [str(Path(__file__).parent / folder)]
 

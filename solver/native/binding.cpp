@@ -150,15 +150,17 @@ class Fleet {
   }
 
   std::vector<int> reaches(const std::vector<int>& robots, const Values& forces, const Table& directions,
-                           double increment, double limit, double length) {
-    if (forces.shape(0) != robots.size() || directions.shape(0) != robots.size() || directions.shape(1) != D - 1)
-      throw std::invalid_argument("one force and direction for each robot");
+                           double increment, double limit, double length, const Blocks& reached) {
+    if (forces.shape(0) != robots.size() || directions.shape(0) != robots.size() || directions.shape(1) != D - 1 ||
+        reached.shape(0) != robots.size() || reached.shape(1) != D)
+      throw std::invalid_argument("one force, direction and force reached for each robot");
     expect(robots);
     std::vector<int> found(robots.size());
     const double *force = forces.data(), *direction = directions.data();
+    double* to = reached.data();
     nb::gil_scoped_release released;
     batch_.each(robots, [&](ccr::Follower<D>& follower, int k) {
-      found[k] = follower.reaches(force[k], direction + (D - 1) * k, increment, limit, length);
+      found[k] = follower.reaches(force[k], direction + (D - 1) * k, increment, limit, length, to + D * k);
     });
     return found;
   }
@@ -207,7 +209,7 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
       .def("step", &Fleet<D>::step, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a,
            "Move some robots to their commands (cables, length), in place.")
       .def("reaches", &Fleet<D>::reaches, "robots"_a, "forces"_a, "directions"_a, "increment"_a, "limit"_a, "length"_a,
-           "Whether steady pulls of some robots from rest, along directions, reach their forces without an event.");
+           "reached"_a, "Whether steady pulls of some robots from rest, along directions, reach their forces without an event.");
 }
 
 }  // namespace

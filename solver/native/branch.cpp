@@ -551,7 +551,9 @@ Status Branch<Model>::follow(const double* from, const double* target, double* t
 }
 
 template <class Model>
-bool Branch<Model>::reaches(double force, const double* direction, double increment, double limit, double length) {
+bool Branch<Model>::reaches(double force, const double* direction, double increment, double limit, double length,
+                            double* reached) {
+  std::fill_n(reached, kSpace, 0.0);
   Command command{{}, length};
   std::vector<double> rest(block_size());
   rest[kCables] = length;
@@ -567,6 +569,7 @@ bool Branch<Model>::reaches(double force, const double* direction, double increm
     settle();
     Position total{};
     for (int j = 0; j < obstacles; ++j) total += newton_.chain.push(present_.active, j);
+    std::copy_n(total.v.begin(), kSpace, reached);
     if (newton_.chain.touching(present_.active) && norm(total) >= force) return true;
   }
   return false;

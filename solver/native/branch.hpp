@@ -36,8 +36,10 @@ class Follower {
   virtual Status follow(const double* from, const double* target, double* to) = 0;
 
   // Whether steady pulls from rest, of this increment along a direction and to less than this limit, reach a contact force
-  // without an event on the way; false as well when the robot at rest is not clear of the obstacles.
-  virtual bool reaches(double force, const double* direction, double increment, double limit, double length) = 0;
+  // without an event on the way; false as well when the robot at rest is not clear of the obstacles. Writes the force
+  // reached last, all obstacles together, to `reached`.
+  virtual bool reaches(double force, const double* direction, double increment, double limit, double length,
+                       double* reached) = 0;
 
   int iterations = 0;                    // of Newton's method in the last follow
   std::vector<double>* trace = nullptr;  // when set, receives the three numbers of every node at every accepted shape
@@ -76,7 +78,8 @@ class Branch : public Follower<Model::kSpace> {
   std::size_t block_size() const override;
   void enter(std::span<const Obstacle<kSpace>> obstacles) override;
   Status follow(const double* from, const double* target, double* to) override;
-  bool reaches(double force, const double* direction, double increment, double limit, double length) override;
+  bool reaches(double force, const double* direction, double increment, double limit, double length,
+               double* reached) override;
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension };

@@ -11,12 +11,25 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from solver.formulation import TINY, GapLaw, NodeProblem, capsule_gap, circle_gap, divided, gaps_of, half_plane_gap, norms
+from solver.formulation import (
+    TINY,
+    GapLaw,
+    NodeProblem,
+    capsule_gap,
+    circle_gap,
+    divided,
+    gaps_of,
+    half_plane_gap,
+    norms,
+)
 
 if TYPE_CHECKING:  # the build runs this file without the package
     from solver.spatial.robot import SpatialRobot
 
-HALVINGS, SERIES_TERMS = 2, 12  # of an angle, and of the power series of its square: to the last digit for a quarter turn
+HALVINGS, SERIES_TERMS = (
+    2,
+    12,
+)  # of an angle, and of the power series of its square: to the last digit for a quarter turn
 
 
 def cylinder_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -132,7 +145,9 @@ def bend_function() -> ca.Function:
     """
     segment = _Segment()
     bending, inverse = segment.bending, _inverse(ca.jacobian(segment.closure, segment.bending))
-    values, rates, _ = (ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(segment.squares)), strict=True))
+    values, rates, _ = (
+        ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(segment.squares)), strict=True)
+    )
     outputs = [segment.chord, ca.vec(segment.rotation.T), ca.sum1(values)]
     for inputs in (segment.control, segment.pulls):
         bent = -inverse @ ca.jacobian(segment.closure, inputs)
@@ -154,7 +169,9 @@ def bow_function() -> ca.Function:
     control, bending = segment.control, segment.bending
     both = ca.vertcat(control, bending)
     squares, held, rated = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
-    _, rates, bends = (ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True))
+    _, rates, bends = (
+        ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True)
+    )
     work = ca.dot(rated, squares) + ca.dot(force, segment.chord)
     axis = ca.jacobian(segment.axis, both)
     moments = axis.T @ segment.turning.T @ moment  # slope of the work of the moment

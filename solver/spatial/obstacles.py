@@ -233,10 +233,14 @@ class Box(SpatialObstacle):
         for size in (*self.sizes, self.edge):
             require_positive("a size or the edge", size)
         if self.edge > min(self.sizes) / 2:
-            raise ValueError(f"edge is {self.edge}; it must be at most {min(self.sizes) / 2:.6g}, half the smallest size")
+            raise ValueError(
+                f"edge is {self.edge}; it must be at most {min(self.sizes) / 2:.6g}, half the smallest size"
+            )
         object.__setattr__(self, "axis", direction("axis", self.axis, "of the first axis", 3))
         across = np.subtract(self.second, np.dot(self.second, self.axis) * np.array(self.axis))
-        object.__setattr__(self, "second", direction("second", across.tolist(), "of the second axis, not of the first", 3))
+        object.__setattr__(
+            self, "second", direction("second", across.tolist(), "of the second axis, not of the first", 3)
+        )
 
     @property
     def axes(self) -> np.ndarray:

@@ -70,9 +70,7 @@ class SpatialRobot:
             raise ValueError(f"max_cable_mm is {self.max_cable_mm}; it must be below {bound:.6g}")
 
     @classmethod
-    def prototype(
-        cls, *, segments: int = 18, angle: float = math.pi / 2, max_tension: float = 15.0
-    ) -> "SpatialRobot":
+    def prototype(cls, *, segments: int = 18, angle: float = math.pi / 2, max_tension: float = 15.0) -> "SpatialRobot":
         """The paper's prototype, with a second cable; of its rigidity see :meth:`solver.Robot.prototype`."""
         return cls(length_mm=180.0, segments=segments, offset_mm=8.0, angle=angle, max_tension=max_tension)
 

@@ -52,13 +52,13 @@ def test_renders_to_an_array_and_to_a_window(env_id, monkeypatch):
     assert picture.dtype == np.uint8
     window = make(env_id, render_mode="human")
     window.reset(seed=0)
-    window.step(np.ones(1, np.float32))
+    window.step(np.ones(window.action_space.shape, np.float32))
     window.close()
 
 
 @EVERY_ID
 def test_same_seed_same_bits(env_id):
-    actions = np.random.default_rng(0).uniform(-0.5, 1, (64, 1)).astype(np.float32)
+    actions = np.random.default_rng(0).uniform(-0.5, 1, (64, *make(env_id).action_space.shape)).astype(np.float32)
     first, second = (play(make(env_id, obs_mode="flat"), actions) for _ in range(2))
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
@@ -80,7 +80,9 @@ def test_observations_stay_in_bounds_and_rewards_add_up(env_id, obs_mode):
         env.reset(seed=seed)
         truncated, steps = False, 0
         while not truncated:
-            observation, reward, _, truncated, info = env.step(generator.uniform(-0.3, 1, 1).astype(np.float32))
+            observation, reward, _, truncated, info = env.step(
+                generator.uniform(-0.3, 1, env.action_space.shape).astype(np.float32)
+            )
             steps += 1
             assert env.observation_space.contains(observation)
             assert reward == pytest.approx(sum(info["reward_terms"].values()), abs=1e-12)
@@ -96,7 +98,7 @@ def test_forces_vanish_without_contact_and_are_copies(env_id):
     assert not info["force_true"].any()
     assert not info["force_est"].any()
     info["force_true"][:] = 7.0
-    *_, info = env.step(np.zeros(1, np.float32))
+    *_, info = env.step(np.zeros(env.action_space.shape, np.float32))
     assert not info["force_true"].any()
 
 
@@ -104,10 +106,13 @@ def test_forces_vanish_without_contact_and_are_copies(env_id):
 def test_a_steady_pull_reaches_every_set_point(env_id):
     env = make(env_id)
     for seed in range(30):
-        _, info = env.reset(seed=seed)
+        observation, info = env.reset(seed=seed)
+        pull = np.ones(1, np.float32)
+        if "obstacle" in observation:
+            pull = observation["obstacle"][:2] / np.linalg.norm(observation["obstacle"][:2])
         reached, truncated = 0.0, False
         while reached < info["desired_force"] and not truncated:
-            *_, truncated, info = env.step(np.ones(1, np.float32))
+            *_, truncated, info = env.step(pull)
             reached = np.linalg.norm(info["force_true"])
         assert reached >= info["desired_force"]
 
@@ -115,13 +120,14 @@ def test_a_steady_pull_reaches_every_set_point(env_id):
 @EVERY_ID
 def test_bad_actions_are_refused_and_change_nothing(env_id):
     env = make(env_id).unwrapped
+    shape = env.action_space.shape
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
-        env.step(np.zeros(1))
+        env.step(np.zeros(shape))
     env.reset(seed=0)
-    env.step(np.ones(1, np.float32))
+    env.step(np.ones(shape, np.float32))
     before = env.equilibrium
-    for action in (np.array([np.nan]), np.zeros(2), np.array([[0.5]]), np.float32(0.5)):
-        with pytest.raises(ValueError, match="finite number in an array of shape"):
+    for action in (np.full(shape, np.nan), np.zeros(3), np.zeros((1, *shape)), np.float32(0.5)):
+        with pytest.raises(ValueError, match="finite numbers of shape"):
             env.step(action)
     assert np.array_equal(env.equilibrium.block, before.block)
 

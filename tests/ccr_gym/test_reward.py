@@ -7,8 +7,11 @@ from ccr_gym.reward import TERMS, RewardWeights, reward_terms
 from solver.operations import ARRAYS, NUMBERS
 
 
-def terms(force, desired=0.1, clearance=0.0, action=0.0):
-    return dict(zip(TERMS, reward_terms(RewardWeights(), force, desired, clearance, action, NUMBERS), strict=True))
+def terms(force, desired=0.1, clearance=0.0, effort=0.0):
+    error = abs(force - desired) / desired
+    return dict(
+        zip(TERMS, reward_terms(RewardWeights(), force, desired, error, clearance, effort, NUMBERS), strict=True)
+    )
 
 
 def test_the_set_point_is_the_best_place():
@@ -23,19 +26,23 @@ def test_each_term_reads_what_it_names():
     assert terms(0.0, clearance=50.0)["approach"] == pytest.approx(-0.5)
     assert terms(0.0, clearance=500.0)["approach"] == -1
     assert terms(0.1, clearance=50.0)["approach"] == 0
-    assert terms(0.1, action=-1.0)["effort"] == pytest.approx(-0.02)
+    assert terms(0.1, effort=1.0)["effort"] == pytest.approx(-0.02)
     assert terms(10.0)["force_error"] == -1
 
 
 def test_weights_scale_their_terms():
     doubled = RewardWeights(force_error=2, accuracy=2, overshoot=1, approach=2, effort=0.04)
     for force in (0.0, 0.05, 0.15):
-        once, twice = (reward_terms(weights, force, 0.1, 3.0, 0.5, NUMBERS) for weights in (RewardWeights(), doubled))
+        once, twice = (
+            reward_terms(weights, force, 0.1, 0.3, 3.0, 0.5, NUMBERS) for weights in (RewardWeights(), doubled)
+        )
         assert twice == pytest.approx([2 * term for term in once])
 
 
 def test_arrays_give_the_numbers_of_each_entry():
     forces = np.array([0.0, 0.08, 0.1, 0.2])
-    batch = reward_terms(RewardWeights(), forces, np.full(4, 0.1), np.full(4, 3.0), np.zeros(4), ARRAYS)
+    desired, clearance = np.full(4, 0.1), np.full(4, 3.0)
+    errors = np.abs(forces - desired) / desired
+    batch = reward_terms(RewardWeights(), forces, desired, errors, clearance, np.zeros(4), ARRAYS)
     for i, force in enumerate(forces.tolist()):
         assert dict(zip(TERMS, (term[i] for term in batch), strict=True)) == terms(force, clearance=3.0)

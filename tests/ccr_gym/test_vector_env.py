@@ -57,7 +57,7 @@ def test_equals_single_environments(pytestconfig, env_id, mode, obs_mode):
     same(ours.reset(seed=11), theirs.reset(seed=11))
     generator = np.random.default_rng(0)
     for _ in range(pytestconfig.getoption("vector_steps") // COUNT):
-        actions = generator.uniform(-0.4, 1, (COUNT, 1)).astype(np.float32)
+        actions = generator.uniform(-0.4, 1, ours.action_space.shape).astype(np.float32)
         our, their = ours.step(actions), theirs.step(actions)
         same(our, their)
         ended = our[2] | our[3]
@@ -69,12 +69,11 @@ def test_equals_single_environments(pytestconfig, env_id, mode, obs_mode):
 
 @EVERY_ID
 def test_results_do_not_depend_on_threads(env_id):
-    actions = np.random.default_rng(1).uniform(-0.4, 1, (40, 23, 1))
     records = []
     for threads in (1, 2, 3):
         env = gymnasium.make_vec(env_id, 23, vectorization_mode="vector_entry_point", threads=threads, obs_mode="flat")
         record = [env.reset(seed=2)[0]]
-        for action in actions:
+        for action in np.random.default_rng(1).uniform(-0.4, 1, (40, *env.action_space.shape)):
             observation, reward, *_ = env.step(action)
             record += [observation, reward]
         records.append(record)

@@ -117,7 +117,9 @@ def test_gap(obstacle):
     points = center + generator.normal(size=(200, 3)) * radius
     points = points[obstacle.gap(points) > 0]
     steps = STEP * np.eye(3)
-    slopes = np.stack([obstacle.gap(points + step) - obstacle.gap(points - step) for step in steps], axis=1) / (2 * STEP)
+    slopes = np.stack([obstacle.gap(points + step) - obstacle.gap(points - step) for step in steps], axis=1) / (
+        2 * STEP
+    )
     assert obstacle.normal_at(points) == pytest.approx(slopes, abs=1e-7)
     surface = points
     for _ in range(30):

@@ -67,7 +67,9 @@ def test_an_equilibrium_of_the_reference_is_one_of_the_kernel(robot):
 
 def test_derivatives_are_smooth_where_disks_are_parallel(robot):
     problem = spatial_problem(robot, (), ())
-    slope = ca.Function("slope", [problem.unknowns, problem.parameters], [ca.gradient(problem.objective, problem.unknowns)])
+    slope = ca.Function(
+        "slope", [problem.unknowns, problem.parameters], [ca.gradient(problem.objective, problem.unknowns)]
+    )
     rest = SpatialReferenceSolver(robot, Scene()).rest()
     assert np.all(slope(*rest._node_point()).full() == 0)
 

@@ -76,7 +76,9 @@ def compare(slopes, row, ahead, behind):
     assert slopes.turns[row] == pytest.approx(turns, rel=1e-5, abs=1e-8 + 1e-5 * np.abs(turns).max())
 
 
-@pytest.mark.parametrize("obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].stiffness is None else " on a spring"))
+@pytest.mark.parametrize(
+    "obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].stiffness is None else " on a spring")
+)
 def test_everything(obstacles):
     equilibrium = solve(obstacles)
     assert equilibrium.contact.any()
@@ -85,9 +87,15 @@ def test_everything(obstacles):
         compare(slopes, row, solve(obstacles, COMMAND + change), solve(obstacles, COMMAND - change))
     compare(slopes, LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
     first = obstacle_rows(0).start
-    motions = [{"shift": tuple(axis)} for axis in np.eye(3)] + [{"axis": k, "turn": 1.0} for k in range(3)] + [{"growth": 1.0}]
+    motions = (
+        [{"shift": tuple(axis)} for axis in np.eye(3)]
+        + [{"axis": k, "turn": 1.0} for k in range(3)]
+        + [{"growth": 1.0}]
+    )
     for row, motion in enumerate(motions):
-        scaled = lambda by: {k: v if k == "axis" else tuple(by * np.array(v)) if k == "shift" else by * v for k, v in motion.items()}  # noqa: E731,B023
+        scaled = lambda by: {
+            k: v if k == "axis" else tuple(by * np.array(v)) if k == "shift" else by * v for k, v in motion.items()
+        }  # noqa: E731,B023
         ahead, behind = (solve([moved(obstacles[0], **scaled(change))]) for change in (STEP, -STEP))
         compare(slopes, first + row, ahead, behind)
 
