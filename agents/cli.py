@@ -36,10 +36,10 @@ def train(config: TrainConfig) -> None:
 
 
 def evaluate(config: EvaluateConfig) -> None:
-    """Evaluate a trained policy beside the PI controller, on scenes it was never trained on."""
+    """Evaluate a trained policy beside the classical controllers, on scenes it was never trained on."""
     from agents.evaluate import run_episodes, summarize
     from agents.figures import draw_evaluation
-    from agents.policy import ForceController, Policy
+    from agents.policy import ForceController, NewtonController, Policy
     from agents.ppo import PPOPolicy
     from agents.video import record
 
@@ -48,7 +48,7 @@ def evaluate(config: EvaluateConfig) -> None:
     except (FileNotFoundError, ValueError) as error:
         raise SystemExit(str(error)) from error
     env_id = learned.config.env_id
-    policies: tuple[Policy, ...] = (learned, ForceController())
+    policies: tuple[Policy, ...] = (learned, ForceController(), NewtonController())
     episodes = {p.name: run_episodes(p, env_id, config.seed, config.episodes) for p in policies}
     summaries = [summarize(name, played) for name, played in episodes.items()]
     policies_report = [summary.as_dict() for summary in summaries]

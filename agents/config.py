@@ -66,7 +66,7 @@ class TrainConfig:
 
 @dataclass(frozen=True, slots=True)
 class EvaluateConfig:
-    """Evaluate a trained policy beside the PI controller, on scenes it was never trained on."""
+    """Evaluate a trained policy beside the classical controllers, on scenes it was never trained on."""
 
     run: Path = Path("runs/ppo")
     """Folder of the training run; results are written there too."""

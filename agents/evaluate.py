@@ -3,13 +3,14 @@
 import time
 from collections import Counter
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import gymnasium
 import numpy as np
 
 import ccr_gym  # noqa: F401 - registers the ids
 from agents.policy import Policy
-from solver import Equilibrium, Status
+from solver import Status
 
 TOLERANCE = 0.05  # relative force error that counts as reached
 
@@ -19,7 +20,8 @@ class Episode:
     """One episode, step by step.
 
     Attributes:
-        desired: Set-point [N].
+        desired: Magnitude of the set-point [N].
+        lacking: How far the force is from the set-point after every step, of magnitudes or vectors, ``(k,)`` [N].
         true: True contact force magnitude after every step, ``(k,)`` [N].
         estimated: Virtual-work estimate of it, ``(k,)`` [N].
         statuses: Solver status of every step.
@@ -28,16 +30,17 @@ class Episode:
     """
 
     desired: float
+    lacking: np.ndarray
     true: np.ndarray
     estimated: np.ndarray
     statuses: tuple[Status, ...]
-    equilibria: tuple[Equilibrium, ...]
+    equilibria: tuple[Any, ...]
     seconds: float
 
     @property
     def error(self) -> np.ndarray:
         """Relative force error after every step, ``(k,)``."""
-        return np.asarray(np.abs(self.true - self.desired) / self.desired)
+        return np.asarray(self.lacking / self.desired)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +76,12 @@ class Summary:
         return asdict(self)
 
 
-def run_episode(policy: Policy, env_id: str, seed: int) -> Episode:
-    """Play one episode."""
-    env = gymnasium.make(env_id, obs_mode="dict", disable_env_checker=True)
+def run_episode(policy: Policy, env_id: str, seed: int, **kwargs: Any) -> Episode:
+    """Play one episode of an environment made with some arguments."""
+    env = gymnasium.make(env_id, obs_mode="dict", disable_env_checker=True, **kwargs)
     observation, info = env.reset(seed=seed)
-    policy.reset()
+    policy.reset(env)
+    lacking: list[float] = []
     true, estimated, statuses, equilibria, seconds = [], [], [], [], 0.0
     truncated = False
     while not truncated:
@@ -86,18 +90,20 @@ def run_episode(policy: Policy, env_id: str, seed: int) -> Episode:
         seconds += time.perf_counter() - start
         observation, _, _, truncated, info = env.step(action)
         true.append(np.linalg.norm(info["force_true"]))
+        goal = info["desired_force"]
+        lacking.append(abs(true[-1] - goal) if np.ndim(goal) == 0 else float(np.linalg.norm(info["force_true"] - goal)))
         estimated.append(np.linalg.norm(info["force_est"]))
         statuses.append(Status(info["solver_status"]))
         equilibria.append(env.get_wrapper_attr("equilibrium"))
     env.close()
-    return Episode(
-        info["desired_force"], np.array(true), np.array(estimated), tuple(statuses), tuple(equilibria), seconds
-    )
+    told = tuple(statuses), tuple(equilibria), seconds
+    desired = float(np.linalg.norm(info["desired_force"]))
+    return Episode(desired, np.array(lacking), np.array(true), np.array(estimated), *told)
 
 
-def run_episodes(policy: Policy, env_id: str, seed: int, count: int) -> list[Episode]:
+def run_episodes(policy: Policy, env_id: str, seed: int, count: int, **kwargs: Any) -> list[Episode]:
     """Play episodes of consecutive seeds."""
-    return [run_episode(policy, env_id, seed + i) for i in range(count)]
+    return [run_episode(policy, env_id, seed + i, **kwargs) for i in range(count)]
 
 
 def summarize(name: str, episodes: list[Episode]) -> Summary:
@@ -109,7 +115,7 @@ def summarize(name: str, episodes: list[Episode]) -> Summary:
         policy=name,
         median_error=float(np.median(final)),
         mean_error=float(final.mean()),
-        median_error_mn=float(np.median([1e3 * abs(e.true[-1] - e.desired) for e in episodes])),
+        median_error_mn=float(np.median([1e3 * e.lacking[-1] for e in episodes])),
         success=float((final <= TOLERANCE).mean()),
         settling_steps=float(np.median(settled)) if settled else float("nan"),
         peak_overshoot=float(np.median([max(0.0, e.true.max() / e.desired - 1) for e in episodes])),

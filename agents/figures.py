@@ -1,6 +1,7 @@
 """Figures of an evaluation."""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from agents.evaluate import Episode
 from ccr_gym.rendering import onto_surface, surface_axes
 from solver import Equilibrium, HalfPlane
+from solver.spatial import SpatialEquilibrium
 
 TRUE, ESTIMATE, GOAL, BACKBONE, CABLE, OBSTACLE = "C0", "C1", "0.3", "#1f3a7a", "#a06a4a", "#c9d1de"
 COLUMNS = 4
@@ -28,12 +30,17 @@ def draw_evaluation(episodes: dict[str, list[Episode]], path: Path) -> None:
         row[0].set_ylabel("contact force [mN]")
     axes[0, 0].legend(fontsize=8, loc="best")
     episode = next(iter(episodes.values()))[0]
-    for axis, step in zip(axes[-1], instants(episode), strict=True):
-        draw_shape(axis, episode.equilibria[step])
+    for column, step in enumerate(instants(episode)):
+        axis, equilibrium = axes[-1, column], episode.equilibria[step]
+        if isinstance(equilibrium, SpatialEquilibrium):
+            axis.remove()
+            axis = axes[-1, column] = figure.add_subplot(rows, COLUMNS, (rows - 1) * COLUMNS + column + 1, projection="3d")
+            draw_shape_in_space(axis, equilibrium)
+        else:
+            draw_shape(axis, equilibrium)
         axis.set_title(
             f"step {step + 1}: {1e3 * episode.true[step]:.0f} of {1e3 * episode.desired:.0f} mN", fontsize=10
         )
-    axes[-1, 0].set_ylabel("y [mm]")
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
@@ -71,8 +78,26 @@ def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
     axis.plot(cable[:, 0], cable[:, 1], color=CABLE, lw=1)
     touched: np.ndarray = np.asarray(equilibrium.contact.any(axis=0))
     axis.plot(*equilibrium.points[touched].T, "o", color="crimson", ms=6, mfc="none")
-    axis.set(aspect="equal", xlim=(-25, 125), ylim=(-5, 190), xlabel="x [mm]")
+    axis.set(aspect="equal", xlim=(-25, 125), ylim=(-5, 190), xlabel="x [mm]", ylabel="y [mm]")
     axis.grid(alpha=0.3)
+
+
+def draw_shape_in_space(axis: Any, equilibrium: SpatialEquilibrium) -> None:
+    """Backbone, pulled cables, disks, obstacles and contacts."""
+    for obstacle in equilibrium.scene_now:
+        axis.plot_surface(*np.moveaxis(obstacle.outline(), -1, 0), color=OBSTACLE, alpha=0.6, lw=0)
+    turns = np.linspace(0, 2 * np.pi, 25)
+    circle = equilibrium.robot.offset_mm * np.column_stack([np.cos(turns), np.sin(turns)])
+    for node, frame in zip(equilibrium.nodes, equilibrium.frames, strict=True):
+        axis.plot(*(node + circle @ frame[:, :2].T).T, color="0.6", lw=0.8)
+    axis.plot(*equilibrium.nodes.T, color=BACKBONE, lw=2.5)
+    for cable in equilibrium.pulled:
+        axis.plot(*cable.T, color=CABLE, lw=1)
+    touched: np.ndarray = np.asarray(equilibrium.contact.any(axis=0))
+    axis.plot(*equilibrium.points[touched].T, "o", color="crimson", ms=6, mfc="none")
+    axis.set(xlim=(-90, 90), ylim=(-90, 90), zlim=(0, 180), xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
+    axis.set_box_aspect((1, 1, 1))
+    axis.tick_params(labelsize=7)
 
 
 def _plate(wall: HalfPlane, backbone: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """PPO by Stable-Baselines3: train, save together what belongs together, and load it again."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -78,10 +79,10 @@ class PPOPolicy:
         self._model = PPO.load(run / POLICY, device="cpu")
         self._normalizer = VecNormalize.load(str(run / NORMALIZER), FleetVecEnv(self.config.env_id, 1))
 
-    def reset(self) -> None:
+    def reset(self, env: Any = None) -> None:
         """Nothing to forget."""
 
     def act(self, observation: Observation) -> np.ndarray:
-        """The mean action for a dictionary observation, ``(1,)``."""
+        """The mean action for a dictionary observation."""
         flat = np.concatenate(list(observation.values()))
         return np.asarray(self._model.predict(self._normalizer.normalize_obs(flat), deterministic=True)[0])

@@ -16,7 +16,7 @@ def record(policy: Policy, env_id: str, seed: int, episodes: int, path: Path) ->
     with writer:
         for i in range(episodes):
             observation, _ = env.reset(seed=seed + i)
-            policy.reset()
+            policy.reset(env)
             truncated = False
             while not truncated:
                 observation, _, _, truncated, _ = env.step(policy.act(observation))

@@ -166,14 +166,14 @@ class SpatialPushEnv(ContactEnv):
     | --- | --- | --- | --- | --- |
     | 0–1 | `cable` | signed displacements | `cable_limit_mm` (10 mm) | [-1, 1] |
     | 2–20 | `contact` | multiplier > 0 at the backbone point of nodes 0…n | flag | {0, 1} |
-    | 21–96 | `contact` | multiplier > 0 at the holes of nodes 0…n, cable by cable: first, second, opposites | flag | {0, 1} |
+    | 21–96 | `contact` | multiplier > 0 at the holes of nodes 0…n: first, second cable, opposites | flag | {0, 1} |
     | 97 | `desired_force` | set-point | 0.5 N | [0, 1] |
     | 98 | `force_error` | set-point minus measured magnitude | 0.5 N | [-1, 1] |
     | 99–101 | `force_est` | virtual-work estimate of the force on the robot, x, y, z | 0.5 N | [-1, 1] |
     | 102–104 | `force_measured` | force on the robot from an ideal force sensor, x, y, z | 0.5 N | [-1, 1] |
     | 105–218 | `frames` | first and last axis of the disk of nodes 0…n, node by node | 1 | [-1, 1] |
     | 219–275 | `nodes` | x, y, z of nodes 0…n, node by node | 180 mm | [-1, 1] |
-    | 276–282 | `obstacle` | centre x, y, z; direction of a cylinder's axis, else 0; radius | 180 mm, 1, 20 mm | [-1, 1] |
+    | 276–282 | `obstacle` | centre x, y, z; axis of a cylinder, else 0; radius | 180 mm, 1, 20 mm | [-1, 1] |
 
     Without `force_sensor` the keys `force_error` and `force_measured` are absent. With `task={"force_vector": True}`
     `desired_force` and `force_error` are vectors of three numbers in [-1, 1], and all indices after them grow by two or
@@ -182,27 +182,27 @@ class SpatialPushEnv(ContactEnv):
     ## Rewards
     The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the set-point, both
     magnitudes, or vectors with `force_vector` where their difference is taken: `force_error` −min(|F−F_d|/F_d, 1);
-    `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), 1) / 2; `approach` minus the clearance in units
-    of 100 mm while nothing touches; `effort` −0.02 times the mean square of the action.
+    `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), 1) / 2; `approach` minus the clearance in
+    units of 100 mm while nothing touches; `effort` −0.02 times the mean square of the action.
 
     ## Starting State
     The straight robot, cables slack. The obstacle stands at a uniform azimuth, its centre 35–65 mm off the axis and
-    80–150 mm high, its radius uniform in 10–16 mm; half of them are cylinders of 60 mm across the way of the robot, tilted
-    by up to 30°. The set-point is uniform in 20–150 mN, drawn again until a steady pull towards the obstacle reaches it
-    without a stall, jam or snap. With `force_vector` that pull is up to 0.25 rad aside of the obstacle, and the force it
-    gets to is the set-point.
+    80–150 mm high, its radius uniform in 10–16 mm; half of them are cylinders of 60 mm across the way of the robot,
+    tilted by up to 30°. The set-point is uniform in 20–150 mN, drawn again until a steady pull towards the obstacle
+    reaches it without a stall, jam or snap. With `force_vector` that pull is up to 0.25 rad aside of the obstacle, and
+    the force it gets to is the set-point.
 
     ## Episode End
     No state is terminal. Episodes are truncated after 64 steps.
 
     ## Info
-    `force_true` and `force_est` (force on the robot, (3,) [N]), `desired_force` [N], `cable_mm` and `tension` ((2,) [mm],
-    [N]), `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success` (within 5 %
-    of the set-point), `reward_terms`.
+    `force_true` and `force_est` (force on the robot, (3,) [N]), `desired_force` [N], `cable_mm` and `tension` ((2,)
+    [mm], [N]), `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success`
+    (within 5 % of the set-point), `reward_terms`.
 
     ## Arguments
-    `render_mode`, the fields of `ccr_gym.settings.SpatialSettings`, and `task`: `SpatialPush` or a mapping of its fields;
-    mappings make every argument JSON-able.
+    `render_mode`, the fields of `ccr_gym.settings.SpatialSettings`, and `task`: `SpatialPush` or a mapping of its
+    fields; mappings make every argument JSON-able.
 
     ## Version History
     * v0: initial version.

@@ -31,7 +31,7 @@ SHADOW: Color = (226, 230, 237)
 def project(points: ArrayLike) -> np.ndarray:
     """Places in the picture's plane, which the canvas' camera maps, ``(…, 2)`` [mm], of points ``(…, 3)`` [mm]."""
     middle = (LAYOUT.left_mm + LAYOUT.right_mm) / 2
-    return np.asarray(points) @ np.column_stack([RIGHT, UP]) + (middle, 0.0)
+    return np.asarray(np.asarray(points) @ np.column_stack([RIGHT, UP]) + (middle, 0.0))
 
 
 def draw_space(canvas: Canvas, frame: Frame) -> None:
@@ -76,7 +76,8 @@ def draw_surface(canvas: Canvas, surface: np.ndarray) -> None:
     for face, shade in zip(canvas.camera(project(corners)), shades, strict=True):
         if shade > 0:
             color = dark + (0.35 + 0.65 * shade) * (light - dark)
-            canvas.polygon(face, tuple(int(part) for part in color))
+            red, green, blue = color.astype(int).tolist()
+            canvas.polygon(face, (red, green, blue))
 
 
 def draw_robot(canvas: Canvas, equilibrium: SpatialEquilibrium, shown: np.ndarray) -> None:

@@ -13,6 +13,7 @@ from solver.batch import BaseBatch
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
 MAX_DRAWS = 1000
+HALF_CYLINDER_MM = 30.0
 PROBE_MM = 0.5  # cable displacement between the equilibria of a trial pull
 
 
@@ -138,11 +139,12 @@ class SpatialPush:
         )
         outward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         center = distance * outward + [0.0, 0.0, height]
-        half = 30.0 * np.array([-math.cos(tilt) * outward[1], math.cos(tilt) * outward[0], math.sin(tilt)])
+        half = HALF_CYLINDER_MM * np.array([-math.cos(tilt) * outward[1], math.cos(tilt) * outward[0], math.sin(tilt)])
         if kind < self.cylinders:
-            scene = Scene([Cylinder(start=center - half, end=center + half, radius=radius, edge=2.0)])
+            start, end = (tuple((center + side * half).tolist()) for side in (-1, 1))
+            scene = Scene([Cylinder(start=start, end=end, radius=radius, edge=2.0)])
         else:
-            scene = Scene([Sphere(center=center, radius=radius)])
+            scene = Scene([Sphere(center=tuple(center.tolist()), radius=radius)])
         towards = azimuth + aside if self.force_vector else azimuth
         return Assignment(scene, force, (math.cos(towards), math.cos(towards - robot.angle)))
 

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -38,7 +38,7 @@ class BaseBatch(ABC):
         ValueError: If a number is not positive.
     """
 
-    model: Model
+    model: ClassVar[Model]
 
     def __init__(self, robot: Any, count: int, obstacles: int, threads: int = 1) -> None:
         for name, value in (("count", count), ("threads", threads)):

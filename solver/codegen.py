@@ -6,15 +6,15 @@ from types import ModuleType
 
 import casadi as ca
 
-for name, folder in (
+for name, place in (
     ("solver", "."),
     ("solver.spatial", "spatial"),
 ):  # packages that need the kernel that is being built
     sys.modules[name] = package = ModuleType(name)
-    package.__path__ = [str(Path(__file__).parent / folder)]
+    package.__path__ = [str(Path(__file__).parent / place)]
 
-from solver.formulation import GAP_LAWS, arc_function, gap_function, segment_function
-from solver.spatial import formulation as spatial
+from solver.formulation import GAP_LAWS, arc_function, gap_function, segment_function  # noqa: E402
+from solver.spatial import formulation as spatial  # noqa: E402
 
 
 def generate(name: str, functions: list[ca.Function], directory: Path) -> None:

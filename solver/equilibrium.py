@@ -180,8 +180,8 @@ class BaseEquilibrium(ABC):
 class Equilibrium(BaseEquilibrium):
     """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
 
-    Frame: base at the origin, unactuated backbone along +y, cable on the +x side. The lines of points that can touch are
-    those of ``robot.touch``, by default (backbone, cable). The attributes are those of :class:`BaseEquilibrium`.
+    Frame: base at the origin, unactuated backbone along +y, cable on the +x side. The lines of points that can touch
+    are those of ``robot.touch``, by default (backbone, cable). The attributes are those of :class:`BaseEquilibrium`.
     """
 
     robot: Robot

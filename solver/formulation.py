@@ -62,7 +62,7 @@ def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
 
 
 def capsule_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a capsule ``shape = (start, end, r)``: that of the circle or sphere about the nearest point of its axis."""
+    """Gap to a capsule ``shape = (start, end, r)``: that of the ball about the nearest point of its axis."""
     start, axis = shape[: point.numel()], shape[point.numel() : -1] - shape[: point.numel()]
     fraction = ca.dot(point - start, axis) / ca.sumsqr(axis)
     nearest = start + ca.fmin(ca.fmax(fraction, 0), 1) * axis
@@ -343,9 +343,9 @@ def kkt_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[boo
 def second_derivatives(problem: NodeProblem, change: ca.MX) -> ca.Function:
     """Derivatives of the optimality conditions of a problem that was built with a change ``v`` of what it is told.
 
-    With the Lagrangian ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities, inequalities)``
-    and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the multipliers stands in
-    ``F_v`` already.
+    With the Lagrangian ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities,
+    inequalities)`` and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the
+    multipliers stands in ``F_v`` already.
     """
     _, _, objective, equalities, inequalities = problem
     tensions, pushes = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("pushes", inequalities.shape[0])

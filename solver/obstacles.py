@@ -16,7 +16,7 @@ Pair = tuple[float, float]
 Place = tuple[float, ...]
 Matrix = tuple[Place, ...]
 
-SHAPES = {kind: index for index, kind in enumerate(_kernel.SHAPES)}
+SHAPES = {kind: index for index, kind in enumerate(_kernel.SHAPES.split())}
 
 
 class Extent(NamedTuple):
@@ -424,7 +424,7 @@ def direction(name: str, value: Iterable[float], meaning: str, space: int = 2) -
     numbers = place(name, value, space)
     size = math.hypot(*numbers)
     if size == 0:
-        raise ValueError(f"{name} is {numbers}; give the direction {meaning}")
+        raise ValueError(f"{name} is ({', '.join('0' * space)}); give the direction {meaning}")
     return tuple(number / size for number in numbers)
 
 

@@ -151,8 +151,13 @@ class Robot:
 class AnyRobot(Protocol):
     """What robots in the plane and in space have in common."""
 
-    segments: int
-    between: int
+    @property
+    def segments(self) -> int:
+        """Number of segments."""
+
+    @property
+    def between(self) -> int:
+        """Number of points of a line between every two nodes."""
 
     @property
     def lines_mm(self) -> Sized:

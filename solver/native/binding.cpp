@@ -216,7 +216,7 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
 
 NB_MODULE(_kernel, m) {
   m.doc() = "Chain solver: Riccati-Newton SQP on the reduced coordinates, followed along a branch.";
-  m.attr("SHAPES") = nb::tuple(nb::cast(ccr::kShapeNames));
+  m.attr("SHAPES") = ccr::kShapeNames;
   m.attr("SHAPE_SIZE") = ccr::kShapeSize;
   m.attr("MAX_ACTIVE") = ccr::limits::kMaxActive;
   nb::class_<ccr::Robot>(m, "Robot", "A robot as the kernel takes it.")

@@ -26,7 +26,7 @@ class SpatialEquilibrium(BaseEquilibrium):
 
     @property
     def cables_mm(self) -> np.ndarray:
-        """Signed displacements of both pairs of cables, which differ from the command after a stall or jam, ``(2,)`` [mm]."""
+        """Signed displacements of both pairs of cables, not as commanded after a stall or jam, ``(2,)`` [mm]."""
         return self._layout.cables(self.block)
 
     @property
@@ -62,7 +62,7 @@ class SpatialEquilibrium(BaseEquilibrium):
 
     @property
     def onset_tensions(self) -> np.ndarray:
-        """Tensions where the present contact began, signed as the displacements, zero while nothing touches, ``(2,)`` [N]."""
+        """Tensions where the present contact began, signed as the displacements, zero without one, ``(2,)`` [N]."""
         return self._layout.onset(self.block)
 
     @property
@@ -90,7 +90,7 @@ class SpatialEquilibrium(BaseEquilibrium):
 
 
 def touching_points(robot: SpatialRobot, nodes: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """The points of the lines of a robot, ``(p, k, 3)`` [mm], of nodes ``(n+1, 3)`` and their frames ``(n+1, 3, 3)``."""
+    """The points of the lines of a robot, ``(p, k, 3)`` [mm], of nodes ``(n+1, 3)`` and frames ``(n+1, 3, 3)``."""
     return divided(nodes + np.einsum("nij,pj->pni", frames[:, :, :2], robot.lines_mm), robot.between)
 
 

@@ -1,12 +1,12 @@
 """Contact force in space, read in two ways; see :mod:`solver.forces`.
 
 The energy force is that of the model, in any direction. The paper's virtual work is of the plane: one cable, one angle.
-Here it goes beyond the paper, to two cables. The free tip has one virtual displacement for each, and along both the work
-of the contact force is to balance that of the loads, ``c F·x'_k + Σ_j P_j M_jk = 0``, with the cable load P since the
-onset of the contact and M_jk the turn of the free tip towards cable j per displacement of cable k, times the offset. One
-unknown factor c of a known direction F meets both equations as well as can be, by least squares; the combination that
-counts is the one that moves the tip against the contact, in the plane of which this is eq. 10 of the paper. Friction is
-a ratio μ of the normal force along the way that the tip would slide on the surface in that motion.
+Here it goes beyond the paper, to two cables. The free tip has one virtual displacement for each, and along both the
+work of the contact force is to balance that of the loads, ``c F·x'_k + Σ_j P_j M_jk = 0``, with the cable load P since
+the onset of the contact and M_jk the turn of the free tip towards cable j per displacement of cable k, times the
+offset. One unknown factor c of a known direction F meets both equations as well as can be, by least squares; the
+combination that counts is the one that moves the tip against the contact, in the plane of which this is eq. 10 of the
+paper. Friction is a ratio μ of the normal force along the way that the tip would slide on the surface in that motion.
 """
 
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ class SpatialVirtualWork:
         slopes = equilibrium.tip_slopes
         forces = with_friction(equilibrium.forces, slopes[:, :3], self.friction)
         loads = np.where(equilibrium.cables_mm < 0, -1.0, 1.0) * equilibrium.tensions - equilibrium.onset_tensions
-        return virtual_work(forces.sum(axis=0), loads, slopes) * forces
+        return np.asarray(virtual_work(forces.sum(axis=0), loads, slopes) * forces)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,10 +1,10 @@
-"""The mathematics of the robot in space (eq. 13), written once, in CasADi, as :mod:`solver.formulation` does for the plane.
+"""The mathematics of the robot in space (eq. 13), written once, in CasADi.
 
 A segment turns its upper disk by the rotation Q from the lower one. In the frame halfway between the two, its backbone
-is ``l0·s`` with a unit vector s, and the way of a hole h of the disk is ``l0·s + b × h``, where b lies along the axis of
-Q and is ``2 sin θ/2`` long. So the two cable lengths of eq. 13 are quadratic in b, and ``2 asin(|b × h| / 2a)`` is the
-angle between the disks that the objective counts. The controls of a segment are shear (the first two parts of s) and
-twist (the last part of b); the lengths of the cables then give its bending (the first two parts of b).
+is ``l0·s`` with a unit vector s, and the way of a hole h of the disk is ``l0·s + b × h``, where b lies along the axis
+of Q and is ``2 sin θ/2`` long. So the two cable lengths of eq. 13 are quadratic in b, and ``2 asin(|b × h| / 2a)`` is
+the angle between the disks that the objective counts. The controls of a segment are shear (the first two parts of s)
+and twist (the last part of b); the lengths of the cables then give its bending (the first two parts of b).
 """
 
 from typing import TYPE_CHECKING
@@ -33,7 +33,7 @@ HALVINGS, SERIES_TERMS = (
 
 
 def cylinder_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a cylinder with rounded edges ``shape = (center, axis, radius and half-length of its core, edge radius)``."""
+    """Gap to a cylinder with rounded edges ``shape = (center, axis, radius and half-length of core, edge radius)``."""
     offset, axis = point - shape[:3], shape[3:6]
     along = ca.dot(offset, axis)
     across = ca.sqrt(ca.sumsqr(offset - along * axis) + TINY)
@@ -70,7 +70,7 @@ def square_angle(square: ca.SX, halvings: int = HALVINGS) -> tuple[ca.SX, ca.SX,
         for k in range(1, SERIES_TERMS + 1):
             coefficients.append((k, coefficient))
             coefficient *= 2 * k * k / ((k + 1) * (2 * k + 1))
-        value, slope, bend = 0, 0, 0
+        value = slope = bend = ca.SX(0)
         for k, c in reversed(coefficients):
             value, slope = c + square * value, k * c + square * slope
             bend = k * (k - 1) * c + square * bend if k > 1 else bend
@@ -162,8 +162,8 @@ def bend_function() -> ca.Function:
 def bow_function() -> ca.Function:
     """``(control, bending, pulls, l0, holes, force, moment) → Hessian in the control, row by row``, ``(9,)``.
 
-    Of the objective and the work of a force on the chord and a moment on the turn of the upper disk, in the frame of the
-    lower one, with the bending that the closure gives.
+    Of the objective and the work of a force on the chord and a moment on the turn of the upper disk, in the frame of
+    the lower one, with the bending that the closure gives.
     """
     segment, force, moment = _Segment(), ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
     control, bending = segment.control, segment.bending
@@ -233,7 +233,7 @@ def spatial_problem(
     equalities += [norms(disk[:, 1:]) - a for disk in disks]
     between = sides[0] * sides[1] * ca.cos(robot.angle)
     equalities.append(ca.sum1(disks[0][:, 1:] * disks[1][:, 1:]) / a - a * between)
-    energy = sum(ca.sum2(_square_angles(disk, a)) for disk in disks)
+    energy = ca.sum2(_square_angles(disks[0], a)) + ca.sum2(_square_angles(disks[1], a))
     holes = [side * disk for side, disk in zip(sides, disks, strict=True)]
     displacements = ca.reshape(unknowns[9 * n :], 3, -1)
     gaps = []

@@ -64,7 +64,7 @@ class Sphere(SpatialObstacle):
 
     def outline(self) -> np.ndarray:
         """Points of the sphere, ``(u, v, 3)`` [mm]."""
-        return self.center + self.radius * _ball(np.eye(3))
+        return np.asarray(self.center + self.radius * _ball(np.eye(3)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +103,7 @@ class HalfSpace(SpatialObstacle):
         """Corners of a square of the surface around the point, 60 mm wide, ``(2, 2, 3)`` [mm]."""
         _, first, second = _axes(np.array(self.normal))
         sides = np.array([-30.0, 30.0])
-        return self.point + sides[:, None, None] * first + sides[None, :, None] * second
+        return np.asarray(self.point + sides[:, None, None] * first + sides[None, :, None] * second)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -263,7 +263,7 @@ class Box(SpatialObstacle):
         ring = np.array([[-x, -y], [x, -y], [x, y], [-x, y], [-x, -y]])
         walls = [(0.0, -z), (1.0, -z), (1.0, z), (0.0, z)]
         corners = np.array([[(*(scale * corner), height) for corner in ring] for scale, height in walls])
-        return self.center + corners @ self.axes
+        return np.asarray(self.center + corners @ self.axes)
 
 
 def _check_ends(start: Place, end: Place) -> None:

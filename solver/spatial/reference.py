@@ -6,10 +6,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from solver.geometry import touchable_points
 from solver.reference import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
 from solver.scene import Scene
 from solver.solve import check_clear, check_width
-from solver.geometry import touchable_points
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot

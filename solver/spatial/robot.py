@@ -15,8 +15,8 @@ class SpatialRobot:
     """A cable-driven continuum robot in space, clamped at the origin and pointing along +z.
 
     Two pairs of cables run through its disks: the first cable at the angle 0 from +x, the second at ``angle``, and one
-    opposite to each. A displacement is that of the first cable of a pair where it is positive, that of its opposite where
-    it is negative; the other cable of the pair is slack and binds nothing.
+    opposite to each. A displacement is that of the first cable of a pair where it is positive, that of its opposite
+    where it is negative; the other cable of the pair is slack and binds nothing.
 
     Attributes:
         length_mm: Length of the backbone, L0 [mm].

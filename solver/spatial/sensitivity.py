@@ -21,8 +21,8 @@ class SpatialSensitivity:
     """Derivatives of an equilibrium, the parameters along the first axis.
 
     The parameters are the displacements of both pairs of cables [mm], the length of the backbone [mm], then of every
-    obstacle its shift in x, y and z [mm], its turns about the axes x, y and z through its centre [rad] and the growth of
-    its radius [mm]; q = 3 + 7m in all. Where a contact is about to open or close, or a displacement is zero, the
+    obstacle its shift in x, y and z [mm], its turns about the axes x, y and z through its centre [rad] and the growth
+    of its radius [mm]; q = 3 + 7m in all. Where a contact is about to open or close, or a displacement is zero, the
     derivatives are those of the side on which the active set and the pulled cables stay as they are.
 
     Attributes:

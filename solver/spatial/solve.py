@@ -25,7 +25,8 @@ class SpatialSolver:
         scene: The obstacles, of :mod:`solver.spatial`.
 
     Raises:
-        ValueError: If an obstacle is one of the plane, overlaps the straight robot, is narrow enough to slip between its
+        ValueError: If an obstacle is one of the plane, overlaps the straight robot, is narrow enough to slip between
+        its
             points, or names a node the robot does not have.
     """
 
@@ -49,8 +50,8 @@ class SpatialSolver:
         A cable whose tension reaches the limit stops there, and the other goes on by itself.
 
         Args:
-            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
-            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign tells which of its cables
+            equilibrium: Where the robot is, from this solver or one of an equal robot and scene. cables_mm:
+            Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign tells which of its cables
                 is pulled.
 
         Returns:

@@ -2,13 +2,14 @@ import numpy as np
 import pytest
 
 from agents.evaluate import run_episodes, summarize
-from agents.policy import ForceController
+from agents.policy import ForceController, NewtonController
 from ccr_gym import ENV_IDS
 
 
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
-def test_the_classical_controller_reaches_the_set_point(env_id):
-    summary = summarize("PI", run_episodes(ForceController(), env_id, seed=50, count=20))
+@pytest.mark.parametrize("policy", [ForceController(), NewtonController()], ids=lambda policy: policy.name)
+def test_classical_controllers_reach_the_set_point(env_id, policy):
+    summary = summarize(policy.name, run_episodes(policy, env_id, seed=50, count=20))
     assert summary.median_error < 0.01
     assert summary.success >= 0.95
     assert summary.contact_losses == 0

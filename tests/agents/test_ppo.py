@@ -51,7 +51,7 @@ def test_evaluate_writes_table_figure_and_video(run, monkeypatch, capsys):
     cli.main()
     assert "PI" in capsys.readouterr().out
     report = json.loads((run / "evaluation.json").read_text())
-    assert [policy["policy"] for policy in report["policies"]] == ["PPO", "PI"]
+    assert [policy["policy"] for policy in report["policies"]] == ["PPO", "PI", "Newton"]
     assert (run / "evaluation.png").stat().st_size > 10_000
     assert (run / "evaluation.mp4").stat().st_size > 10_000
 

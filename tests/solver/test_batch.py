@@ -57,8 +57,8 @@ def test_reaches_is_a_steady_pull():
     batch, forces = BatchSolver(Robot.prototype(), 60, 1), generator.uniform(0.02, 0.3, 60)
     for i, scene in enumerate(scenes):
         batch.assign(i, scene)
-    found = batch.reaches(range(60), forces, 0.5, 14.0)
-    for scene, force, reached in zip(scenes, forces, found, strict=True):
+    found, ends = batch.reaches(range(60), forces, 0.5, 14.0)
+    for scene, force, reached, end in zip(scenes, forces, found, ends, strict=True):
         solver = Solver(Robot.prototype(), scene)
         now, expected = solver.rest(), False
         for command in np.arange(0.5, 14, 0.5):
@@ -69,6 +69,7 @@ def test_reaches_is_a_steady_pull():
                 expected = True
                 break
         assert reached == expected
+        assert not expected or np.all(end == now.forces.sum(axis=0))
     assert 0 < found.sum() < 60
 
 

@@ -28,7 +28,7 @@ def test_forces_follow_from_the_multipliers(pressed):
 def test_forces_and_tensions_do_the_work_that_the_energy_takes(pressed, robot):
     """B (∂J/∂q·q' + ∂J/∂l) = T + Σ F·x' along any motion that keeps the lengths, but for those of the cables."""
     unknowns, parameters = pressed._node_point()
-    slope, _, held, gaps, gap_slopes = (value.full() for value in pressed._derivatives(unknowns, parameters))
+    slope, _, held, _, gap_slopes = (value.full() for value in pressed._derivatives(unknowns, parameters))
     n = robot.segments
     shortening = np.zeros((2, len(held)))
     shortening[0, n : 2 * n] = shortening[1, 2 * n : 3 * n] = -1.0 / n

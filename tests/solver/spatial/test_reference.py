@@ -60,9 +60,9 @@ def test_an_equilibrium_of_the_reference_is_one_of_the_kernel(robot):
     there = reference.rest()
     for pull in np.arange(0.5, 6.1, 0.5):
         there = reference.step(there, (pull, 0.4 * pull))
-    here = kernel.step(there, there.cables_mm + [0.0, 0.1])
+    here = kernel.step(there, there.cables_mm + np.array([0.0, 0.1]))
     assert here.status is Status.CONVERGED
-    assert here.points == pytest.approx(reference.step(there, there.cables_mm + [0.0, 0.1]).points, abs=1e-6)
+    assert here.points == pytest.approx(reference.step(there, there.cables_mm + np.array([0.0, 0.1])).points, abs=1e-6)
 
 
 def test_derivatives_are_smooth_where_disks_are_parallel(robot):

@@ -87,16 +87,13 @@ def test_everything(obstacles):
         compare(slopes, row, solve(obstacles, COMMAND + change), solve(obstacles, COMMAND - change))
     compare(slopes, LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
     first = obstacle_rows(0).start
-    motions = (
-        [{"shift": tuple(axis)} for axis in np.eye(3)]
-        + [{"axis": k, "turn": 1.0} for k in range(3)]
-        + [{"growth": 1.0}]
-    )
+    motions = [
+        *(lambda by, axis=axis: {"shift": by * axis} for axis in np.eye(3)),
+        *(lambda by, axis=axis: {"axis": axis, "turn": by} for axis in range(3)),
+        lambda by: {"growth": by},
+    ]
     for row, motion in enumerate(motions):
-        scaled = lambda by: {
-            k: v if k == "axis" else tuple(by * np.array(v)) if k == "shift" else by * v for k, v in motion.items()
-        }  # noqa: E731,B023
-        ahead, behind = (solve([moved(obstacles[0], **scaled(change))]) for change in (STEP, -STEP))
+        ahead, behind = (solve([moved(obstacles[0], **motion(change))]) for change in (STEP, -STEP))
         compare(slopes, first + row, ahead, behind)
 
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def test_random_walk(pytestconfig, robot, mix, random_sphere, random_shape, rand
         states = random_walk(generator, solver, STEPS_PER_SCENE)
         counts.update(state.status.name for state in states[1:])
         touched += sum(state.contact.any() for state in states)
-        for before, after in zip(states, states[1:], strict=False):
+        for before, after in pairwise(states):
             assert after.gaps.min() >= -1e-6
             assert after.tensions.max() <= robot.max_tension * (1 + 1e-6)
             assert after.displacements[[o.stiffness is None for o in solver.scene]].any() == 0
@@ -37,7 +38,7 @@ def test_random_walk(pytestconfig, robot, mix, random_sphere, random_shape, rand
                 way = list(solver.trace(before, np.clip(after.cables_mm, -12, 12)))
                 way = [before.nodes, *way] if np.allclose(way[-1], after.nodes, atol=1e-6) else []
             # A way of 8.5 mm is the longest that is taken at once; a sphere of 10 mm is cut 0.9 mm deep by it at most.
-            assert all(deepest(solver, *pair) < 1.5 for pair in zip(way, way[1:], strict=False))
+            assert all(deepest(solver, *pair) < 1.5 for pair in pairwise(way))
     print(dict(counts), touched)
     assert "FAILED" not in counts
     assert touched > 0

@@ -201,7 +201,9 @@ def test_a_pull_towards_a_sphere_reaches_a_force(robot):
     for index in range(2):
         batch.assign(index, Scene([SPHERE]))
     towards = np.array([[0.91, 0.41], [-0.91, -0.41]])
-    assert list(batch.reaches([0, 1], np.array([0.01, 0.01]), 0.5, 10.0, towards)) == [True, False]
+    found, forces = batch.reaches([0, 1], np.array([0.01, 0.01]), 0.5, 10.0, towards)
+    assert list(found) == [True, False]
+    assert list(np.linalg.norm(forces, axis=1) >= 0.01) == [True, False]
 
 
 @pytest.mark.parametrize(
