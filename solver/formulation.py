@@ -211,6 +211,12 @@ def gap_function(law: GapLaw) -> ca.Function:
     return ca.Function(f"ccr_{law.kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
 
 
+def clearance_function(law: GapLaw) -> ca.Function:
+    """``(p, shape) → c`` alone, where the slopes are not wanted."""
+    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
+    return ca.Function(f"ccr_{law.kind}_clearance", [point, shape], [ca.cse(law.gap(point, shape))])
+
+
 class NodeProblem(NamedTuple):
     """Eq. 5 in node coordinates, symbolic.
 

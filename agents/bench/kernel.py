@@ -205,7 +205,6 @@ def measure(steps: int, rivals: int) -> dict[str, Any]:
         "growth_exponent": float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0]),
         "sliding_ratio": cost([PUSHED], cable="sliding"),
         "obstacles_ratio": {str(n): cost([PUSHED, *FAR[: n - 1]]) for n in (2, 11, 32)},
-        "far_ratio": cost([PUSHED, *FAR[:10]]),
         "spring_ratio": cost([SPRUNG]),
         "cold_ratio": cold_ratio(),
         "memo_ratio": memo_ratio(),

@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from agents.bench import kernel, peers, throughput
+from agents.bench import kernel, peers, space, throughput
 from agents.config import BenchConfig
 
 
@@ -14,6 +14,7 @@ def bench(config: BenchConfig) -> dict[str, Any]:
     """Measure, print and, where it is asked for, write."""
     found = {
         "kernel": kernel.measure(config.steps, config.rivals),
+        "kernel_in_space": space.measure(config.steps),
         "environments": throughput.environments(),
         "learning": throughput.learning() | throughput.solving(config.seeds),
         "peers": peers.measure(),

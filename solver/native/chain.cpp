@@ -145,7 +145,7 @@ void Chain<Model>::measure_gaps(double slack) {
       for (int start = i * stride; start < robot_.points(); start += robot_.positions())
         for (int k = start; k < start + (i < n ? stride : 1); ++k) {
           if (!obstacle.touchable[k]) continue;
-          gaps_[first + k] = measure_gap(obstacle, minus(points_[k], moved)).value;
+          ccr::measure_gaps(obstacle, std::span<const Position>(&points_[k], 1), moved, &gaps_[first + k]);
           near_.push_back(first + k);
         }
     }

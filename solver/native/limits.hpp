@@ -14,7 +14,7 @@ inline constexpr double kWidestTurn = 3.1;     // angle between consecutive disk
 inline constexpr int kRelaxIterations = 8;     // of Newton's method for the shape that nothing touches
 inline constexpr int kClosureIterations = 12;  // of Newton's method for the bending of a segment in space
 inline constexpr double kWidestBend = 2.0;     // square of 2 sin θ/2 of a segment in space: a quarter turn
-inline constexpr double kClosed = 1e-15;       // change of it that is the last one
+inline constexpr double kClosed = 1e-8;        // change of it that is the last one, being squared
 inline constexpr double kRelaxed = 1e-12;      // relative change that is the last one, being squared
 
 // Newton.
@@ -67,6 +67,7 @@ inline constexpr double kCommandResolution = 1e-11;  // a narrower bracket is no
 inline constexpr int kDescentIterations = 300;
 inline constexpr int kFinishEvery = 8;         // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;    // largest step of one iterate
+inline constexpr double kStretch = 8.0;        // of a damped iterate
 inline constexpr double kDescentFeasibility = 1e-11;
 inline constexpr double kHeld = 1e100;         // multiplier of a gap that a restoration must not release
 inline constexpr double kEnergyRoundoff = 1e-15;

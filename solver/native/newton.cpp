@@ -52,13 +52,16 @@ bool Newton<Model>::convex(const ActiveSet& active, int penalties) {
   return false;
 }
 
-// Else damping, which only shortens the way there.
+// Else damping, which only shortens the way there; tried from a little less than what was needed last.
 template <class Model>
 bool Newton<Model>::convexify(const ActiveSet& active) {
   if (convex(active, kDescentPenalties)) return true;
-  damping_ = kDamping * hessian_.steepest();
+  damping_ = std::max(kDamping * hessian_.steepest(), needed_ / (kDampingGrowth * kDampingGrowth));
   for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
-    if (hessian_.factor(damping_)) return true;
+    if (hessian_.factor(damping_)) {
+      needed_ = damping_;
+      return true;
+    }
   return false;
 }
 
@@ -169,6 +172,7 @@ Verdict Newton<Model>::solve(Iterate& at) {
 
 template <class Model>
 bool Newton<Model>::measure(const Iterate& at) {
+  needed_ = 0;
   if (!chain.evaluate(at)) return false;
   chain.reduced_gradient(at.active);
   return convexify(at.active) && hessian_.factor(damping_ + kMeasureDamping * hessian_.steepest());
@@ -222,12 +226,15 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   const double before = chain.energy();
   double allowed = before + kEnergyRoundoff * before;
   for (int j = 0; j < target.count; ++j) allowed += 2 * kDescentFeasibility * target.multiplier[j];
-  double scale = std::min(1.0, largest / size(step_));
+  const double whole = std::min(1.0, largest / size(step_));
   trial_.command = at.command;
   const ActiveSet touching = closed(target);
+  // Where the curvature is negative the energy sinks farther along a damped step than that goes.
+  const bool stretched = damping_ > 0 && touching.count == target.count;
+  double scale = stretched ? std::min(kStretch, largest / size(step_)) : whole;
   // Restorations are measured by closeness: near a fold the energy hardly resists the motion that ends the branch.
   if (!hessian_.factor(damping_ + kMeasureDamping * hessian_.steepest())) return verdict;
-  for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= 2) {
+  for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale = scale > whole ? whole : scale / 2) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap that is to push
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;

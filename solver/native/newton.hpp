@@ -54,6 +54,7 @@ class Newton {
   double size_ = 0;  // of `step_`
   Iterate trial_;
   double damping_ = 0;
+  double needed_ = 0;  // of damping, in the descent that goes on
 };
 
 }  // namespace ccr

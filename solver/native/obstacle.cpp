@@ -13,28 +13,29 @@ namespace ccr {
 
 namespace {
 
-// Calls `function` with the law of the obstacle's shape, so that it is chosen once for many points.
+// Calls `function` with the law of the obstacle's shape, and that of the gap alone, so that they are chosen once for many
+// points.
 template <class Function>
 void with_law(const Obstacle<2>& obstacle, Function function) {
   switch (obstacle.shape) {
-    case Shape::kCircle: return function(ccr_circle_gap);
-    case Shape::kHalfPlane: return function(ccr_half_plane_gap);
-    case Shape::kEllipse: return function(ccr_ellipse_gap);
-    case Shape::kCapsule: return function(ccr_capsule_gap);
-    case Shape::kPolygon: return function(ccr_polygon_gap);
-    default: return function(obstacle.law);
+    case Shape::kCircle: return function(ccr_circle_gap, ccr_circle_clearance);
+    case Shape::kHalfPlane: return function(ccr_half_plane_gap, ccr_half_plane_clearance);
+    case Shape::kEllipse: return function(ccr_ellipse_gap, ccr_ellipse_clearance);
+    case Shape::kCapsule: return function(ccr_capsule_gap, ccr_capsule_clearance);
+    case Shape::kPolygon: return function(ccr_polygon_gap, ccr_polygon_clearance);
+    default: return function(obstacle.law, obstacle.law);
   }
 }
 
 template <class Function>
 void with_law(const Obstacle<3>& obstacle, Function function) {
   switch (obstacle.shape) {
-    case Shape::kSphere: return function(ccr_sphere_gap);
-    case Shape::kHalfSpace: return function(ccr_half_space_gap);
-    case Shape::kSpatialCapsule: return function(ccr_spatial_capsule_gap);
-    case Shape::kCylinder: return function(ccr_cylinder_gap);
-    case Shape::kBox: return function(ccr_box_gap);
-    default: return function(obstacle.law);
+    case Shape::kSphere: return function(ccr_sphere_gap, ccr_sphere_clearance);
+    case Shape::kHalfSpace: return function(ccr_half_space_gap, ccr_half_space_clearance);
+    case Shape::kSpatialCapsule: return function(ccr_spatial_capsule_gap, ccr_spatial_capsule_clearance);
+    case Shape::kCylinder: return function(ccr_cylinder_gap, ccr_cylinder_clearance);
+    case Shape::kBox: return function(ccr_box_gap, ccr_box_clearance);
+    default: return function(obstacle.law, obstacle.law);
   }
 }
 
@@ -52,14 +53,14 @@ Gap<D> evaluate(Law law, const Obstacle<D>& obstacle, const Position<D>& point) 
 template <int D>
 Gap<D> measure_gap(const Obstacle<D>& obstacle, const Position<D>& point) {
   Gap<D> gap;
-  with_law(obstacle, [&](auto law) { gap = evaluate(law, obstacle, point); });
+  with_law(obstacle, [&](auto law, auto) { gap = evaluate(law, obstacle, point); });
   return gap;
 }
 
 template <int D>
 void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> points, const Position<D>& moved,
                   double* gaps) {
-  with_law(obstacle, [&](auto law) {
+  with_law(obstacle, [&](auto, auto law) {
     for (std::size_t k = 0; k < points.size(); ++k) gaps[k] = evaluate(law, obstacle, minus(points[k], moved)).value;
   });
 }
@@ -89,7 +90,9 @@ bool passes(const Obstacle<D>& obstacle, const Position<D>& from, const Position
   for (int k = 1; k < pieces; ++k) {
     Position<D> between = from;
     for (int i = 0; i < D; ++i) between[i] += static_cast<double>(k) / pieces * path[i];
-    if (measure_gap(obstacle, between).value < -limits::kSweepDepth * obstacle.fineness) return false;
+    double gap;
+    measure_gaps(obstacle, std::span<const Position<D>>(&between, 1), Position<D>{}, &gap);
+    if (gap < -limits::kSweepDepth * obstacle.fineness) return false;
   }
   return true;
 }

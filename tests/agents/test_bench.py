@@ -2,7 +2,7 @@
 
 import pytest
 
-from agents.bench import kernel, report, throughput
+from agents.bench import kernel, report, space, throughput
 
 
 @pytest.fixture(autouse=True)
@@ -26,3 +26,10 @@ def test_kernel():
     assert len(list(kernel.contact_mix(200))) == 200
     assert min(kernel.batch_times(4, steps=3)) > 0
     assert kernel.cost([kernel.PUSHED], repeats=2) > 0
+
+
+def test_kernel_in_space():
+    found = space.contact_mix(400)
+    assert found["steps"] == 400
+    assert found["sign_changes"] > 0
+    assert space.growth((9, 18), repeats=1).keys() == {9, 18}
