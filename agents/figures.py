@@ -34,7 +34,9 @@ def draw_evaluation(episodes: dict[str, list[Episode]], path: Path) -> None:
         axis, equilibrium = axes[-1, column], episode.equilibria[step]
         if isinstance(equilibrium, SpatialEquilibrium):
             axis.remove()
-            axis = axes[-1, column] = figure.add_subplot(rows, COLUMNS, (rows - 1) * COLUMNS + column + 1, projection="3d")
+            axis = axes[-1, column] = figure.add_subplot(
+                rows, COLUMNS, (rows - 1) * COLUMNS + column + 1, projection="3d"
+            )
             draw_shape_in_space(axis, equilibrium)
         else:
             draw_shape(axis, equilibrium)

@@ -37,7 +37,7 @@ def search(observation: Observation, angle: float = math.pi / 2) -> np.ndarray:
         return np.ones(1, np.float32)
     azimuth = math.atan2(observation["obstacle"][1], observation["obstacle"][0])
     pull = np.array([math.cos(azimuth), math.cos(azimuth - angle)])
-    return (pull / np.abs(pull).max()).astype(np.float32)
+    return np.asarray(pull / np.abs(pull).max(), np.float32)
 
 
 @dataclass(slots=True)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sized
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 LINES = ("backbone", "cable", "rim")
 CABLES = ("uniform", "sliding")
@@ -44,20 +44,10 @@ class Robot:
     between: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("length_mm", "offset_mm", "rigidity"):
-            require_positive(name, getattr(self, name))
+        check_numbers(self, LINES)
         if self.cable not in CABLES:
             raise ValueError(f"cable is {self.cable!r}; it must be one of {', '.join(CABLES)}")
         self._check_lengths()
-        object.__setattr__(self, "touch", tuple(self.touch))
-        if not self.touch or len(set(self.touch)) != len(self.touch) or not set(self.touch) <= set(LINES):
-            raise ValueError(f"touch is {self.touch}; it must name some of {LINES}, each once")
-        if not (isinstance(self.between, int) and 0 <= self.between <= 256):
-            raise ValueError(f"between is {self.between!r}; it must be a whole number from 0 to 256")
-        if not self.max_tension > 0:
-            raise ValueError(f"max_tension is {self.max_tension}; it must be positive (math.inf lifts the limit)")
-        if not (isinstance(self.segments, int) and 2 <= self.segments <= 4096):
-            raise ValueError(f"segments is {self.segments!r}; it must be a whole number from 2 to 4096")
         if self.max_cable_mm is None:
             object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, 0.5 * self.lengths_mm[0]))
         require_positive("max_cable_mm", self.max_cable_mm)
@@ -170,6 +160,25 @@ class AnyRobot(Protocol):
     @property
     def spacing_mm(self) -> float:
         """Largest distance between neighbouring points of the backbone that can touch [mm]."""
+
+
+def check_numbers(robot: Any, lines: tuple[str, ...]) -> None:
+    """Refuse what no robot can have; its ``touch`` becomes a tuple, of some of these lines.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    for name in ("length_mm", "offset_mm", "rigidity"):
+        require_positive(name, getattr(robot, name))
+    if not (isinstance(robot.segments, int) and 2 <= robot.segments <= 4096):
+        raise ValueError(f"segments is {robot.segments!r}; it must be a whole number from 2 to 4096")
+    if not robot.max_tension > 0:
+        raise ValueError(f"max_tension is {robot.max_tension}; it must be positive (math.inf lifts the limit)")
+    object.__setattr__(robot, "touch", tuple(robot.touch))
+    if not robot.touch or len(set(robot.touch)) != len(robot.touch) or not set(robot.touch) <= set(lines):
+        raise ValueError(f"touch is {robot.touch}; it must name some of {lines}, each once")
+    if not (isinstance(robot.between, int) and 0 <= robot.between <= 256):
+        raise ValueError(f"between is {robot.between!r}; it must be a whole number from 0 to 256")
 
 
 def require_positive(name: str, value: float | None) -> None:

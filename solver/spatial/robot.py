@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.robot import require_positive
+from solver.robot import check_numbers, require_positive
 
 LINES = ("backbone", "holes", "rim")
 
@@ -47,21 +47,11 @@ class SpatialRobot:
     between: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("length_mm", "offset_mm", "rigidity"):
-            require_positive(name, getattr(self, name))
-        if not (isinstance(self.segments, int) and 2 <= self.segments <= 4096):
-            raise ValueError(f"segments is {self.segments!r}; it must be a whole number from 2 to 4096")
+        check_numbers(self, LINES)
         if not (math.isfinite(self.angle) and abs(math.sin(self.angle)) > 0.1):
             raise ValueError(f"angle is {self.angle}; the cables must not be near one plane with the backbone")
-        if not self.max_tension > 0:
-            raise ValueError(f"max_tension is {self.max_tension}; it must be positive (math.inf lifts the limit)")
-        object.__setattr__(self, "touch", tuple(self.touch))
-        if not self.touch or len(set(self.touch)) != len(self.touch) or not set(self.touch) <= set(LINES):
-            raise ValueError(f"touch is {self.touch}; it must name some of {LINES}, each once")
         if not (isinstance(self.rim_points, int) and 3 <= self.rim_points <= 64):
             raise ValueError(f"rim_points is {self.rim_points!r}; it must be a whole number from 3 to 64")
-        if not (isinstance(self.between, int) and 0 <= self.between <= 256):
-            raise ValueError(f"between is {self.between!r}; it must be a whole number from 0 to 256")
         if self.max_cable_mm is None:
             object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, self.length_mm) / 2)
         require_positive("max_cable_mm", self.max_cable_mm)

@@ -1,0 +1,97 @@
+"""What only the environment in space has: vectors as set-points, what is seen of the obstacle, its settings."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from ccr_gym.environments import SpatialPushEnv
+from ccr_gym.observation import FORCE_SCALE_N
+from solver import Circle, Scene
+from solver.spatial import Cylinder, SpatialRobot, Sphere
+
+VECTOR = {"task": {"force_vector": True}}
+
+
+def make(**kwargs):
+    return gymnasium.make("CCR/SpatialPush-v0", disable_env_checker=True, **kwargs)
+
+
+def test_the_table_of_indices_holds():
+    env = make(obs_mode="flat")
+    flat, _ = env.reset(seed=0)
+    places, start = {}, 0
+    for key, box in make().observation_space.items():
+        places[key] = (start, start + box.shape[0] - 1)
+        start += box.shape[0]
+    assert flat.shape == (283,)
+    for key, (first, last) in places.items():
+        ends = f"{first}–{last}" if last > first else f"{first}"
+        assert f"{ends} | `{key}`" in SpatialPushEnv.__doc__ or key == "contact"
+
+
+def test_what_is_seen_is_where_it_is():
+    env = make()
+    kinds = set()
+    for seed in range(8):
+        observation, _ = env.reset(seed=seed)
+        observation, *_ = env.step(np.array([0.8, -0.4], np.float32))
+        equilibrium = env.unwrapped.equilibrium
+        obstacle = equilibrium.scene.obstacles[0]
+        kinds.add(type(obstacle))
+        seen = observation["obstacle"]
+        assert 180 * seen[:3] == pytest.approx(obstacle.extent.center, abs=1e-4)
+        assert 20 * seen[6] == pytest.approx(obstacle.radius, abs=1e-5)
+        axis = np.zeros(3) if isinstance(obstacle, Sphere) else np.subtract(obstacle.end, obstacle.start) / 60
+        assert seen[3:6] == pytest.approx(axis, abs=1e-6)
+        assert 180 * observation["nodes"].reshape(-1, 3) == pytest.approx(equilibrium.nodes, abs=1e-4)
+        axes = observation["frames"].reshape(-1, 2, 3)
+        assert axes[:, 0] == pytest.approx(equilibrium.frames[:, :, 0], abs=1e-6)
+        assert axes[:, 1] == pytest.approx(equilibrium.frames[:, :, 2], abs=1e-6)
+        assert 10 * observation["cable"] == pytest.approx(equilibrium.cables_mm, abs=1e-6)
+    assert kinds == {Sphere, Cylinder}
+
+
+def test_a_vector_can_be_asked_for():
+    """Its set-point is a force that a steady pull gets to, beside the obstacle's direction."""
+    env = make(**VECTOR)
+    for seed in range(5):
+        observation, info = env.reset(seed=seed)
+        goal = info["desired_force"]
+        assert goal.shape == (3,)
+        assert 0.02 <= np.linalg.norm(goal) <= FORCE_SCALE_N
+        assert FORCE_SCALE_N * observation["desired_force"] == pytest.approx(goal, abs=1e-7)
+        assert FORCE_SCALE_N * observation["force_error"] == pytest.approx(goal, abs=1e-7)
+        _, _, _, _, info = env.step(np.zeros(2, np.float32))
+        assert info["reward_terms"]["force_error"] == -1
+    x, y, z = goal
+    scene = env.unwrapped.equilibrium.scene
+    observation, info = env.reset(options={"scene": scene, "desired_force": (x, y, z)})
+    assert info["desired_force"] == pytest.approx(goal)
+    with pytest.raises(ValueError, match="must have the shape"):
+        env.reset(options={"scene": scene, "desired_force": 0.1})
+
+
+def test_the_vector_form_is_that_of_single_environments():
+    ours = gymnasium.make_vec("CCR/SpatialPush-v0", 3, vectorization_mode="vector_entry_point", **VECTOR)
+    theirs = gymnasium.make_vec("CCR/SpatialPush-v0", 3, vectorization_mode="sync", **VECTOR)
+    (our, our_infos), (their, their_infos) = ours.reset(seed=4), theirs.reset(seed=4)
+    generator = np.random.default_rng(0)
+    for _ in range(70):
+        for key, value in their.items():
+            assert np.array_equal(our[key], value)
+        assert np.array_equal(our_infos["desired_force"], their_infos["desired_force"])
+        actions = generator.uniform(-1, 1, (3, 2)).astype(np.float32)
+        our, our_rewards, *_, our_infos = ours.step(actions)
+        their, their_rewards, *_, their_infos = theirs.step(actions)
+        assert np.array_equal(our_rewards, their_rewards)
+
+
+def test_settings():
+    assert make().unwrapped.settings.robot == SpatialRobot.prototype()
+    robot = {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0, "angle": 2.0}
+    observation, _ = make(robot=robot, obs_mode="dict").reset(seed=0)
+    assert observation["nodes"].shape == (39,)
+    with pytest.raises(ValueError, match="in space it must be 'native'"):
+        make(backend="casadi")
+    with pytest.raises(ValueError, match="of the plane"):
+        make().reset(options={"scene": Scene([Circle(center=(44, 104), radius=15)]), "desired_force": 0.1})
