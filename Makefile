@@ -10,7 +10,7 @@ demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controller, wri
 	$(BIN)/ccr-gym evaluate --run runs/demo
 
 test: $(INSTALL)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 lint: $(INSTALL)
 	$(BIN)/ruff format --check .

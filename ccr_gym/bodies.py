@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ccr_gym.settings import Settings, SpatialSettings
+from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
 from solver import Robot, Scene
 from solver.batch import BaseBatch, BatchSolver, ReferenceBatch
 from solver.forces import virtual_work
-from solver.layout import CABLE, PLANE, SPACE, TENSION, Layout, Model
+from solver.layout import CABLE, LENGTH, PLANE, SPACE, TENSION, Layout, Model
 from solver.operations import ARRAYS, NUMBERS, Operations
 from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialRobot
 from solver.spatial import forces as spatial_forces
@@ -28,12 +28,14 @@ class Body(ABC):
     Attributes:
         model: How many numbers describe a robot.
         settings: What an environment is told.
-        place: Where the cables stand in a command, and in a block: a number for one cable.
+        actions: Numbers of an action.
+        place: Where what they move stands in a command, and in a block: a number for one cable.
         obstacle_size: How many numbers of an obstacle are seen.
     """
 
     model: ClassVar[Model]
     settings: ClassVar[type[Settings]]
+    actions: ClassVar[int]
     place: ClassVar[int | slice]
     obstacle_size: ClassVar[int] = 0
 
@@ -45,17 +47,27 @@ class Body(ABC):
         """The arithmetic of what is one number for a robot: plain for one of them, arrays for many."""
         return NUMBERS if isinstance(which, int) else ARRAYS
 
-    @abstractmethod
     def effort(self, actions: np.ndarray) -> Any:
-        """Actions ``(..., cables)`` within their bounds."""
+        """Actions ``(..., actions)`` within their bounds."""
+        return np.minimum(np.maximum(actions.astype(float), -1.0), 1.0)
 
     @abstractmethod
+    def bounds(self, settings: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest of what actions move, ``(actions,)`` each [mm]."""
+
+    def increments(self, settings: Any) -> np.ndarray:
+        """What full actions move, ``(actions,)`` [mm]."""
+        return np.full(self.actions, settings.max_increment_mm)
+
     def command(self, blocks: np.ndarray, effort: Any, which: Which, settings: Any) -> Any:
-        """Cable displacements that an effort asks for [mm]."""
+        """What an effort asks for, within bounds [mm]."""
+        low, high = self.bounds(settings)
+        command = blocks[which, self.place] + effort * self.increments(settings)
+        return np.minimum(np.maximum(command, low), high)
 
-    @abstractmethod
     def square(self, effort: Any) -> Any:
-        """Mean square of an effort over the cables."""
+        """Mean square of an effort over the actions."""
+        return (effort[..., 0] * effort[..., 0] + effort[..., 1] * effort[..., 1]) / 2
 
     @abstractmethod
     def estimate(
@@ -79,7 +91,7 @@ class Body(ABC):
 class Plane(Body):
     """One cable in the plane."""
 
-    model, settings, place = PLANE, Settings, CABLE
+    model, settings, actions, place = PLANE, Settings, 1, CABLE
 
     def batch(self, settings: Settings, count: int, obstacles: int, threads: int) -> BaseBatch:
         """The solver."""
@@ -91,6 +103,10 @@ class Plane(Body):
         if actions.ndim == 1:
             return min(max(float(actions[0]), -1.0), 1.0)
         return np.minimum(np.maximum(actions[:, 0].astype(float), -1.0), 1.0)
+
+    def bounds(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+        """Of the cable."""
+        return np.zeros(1), np.array([settings.cable_limit_mm])
 
     def command(self, blocks: np.ndarray, effort: Any, which: Which, settings: Settings) -> Any:
         """A displacement from 0 to the limit."""
@@ -133,29 +149,49 @@ class Plane(Body):
         return {"nodes": (nodes, np.tile(pose_scale, robot.segments + 1))}
 
 
+class Insertion(Plane):
+    """One cable in the plane, and a base that inserts the robot."""
+
+    settings, actions, place = InsertionSettings, 2, slice(CABLE, LENGTH + 1)
+
+    def batch(self, settings: InsertionSettings, count: int, obstacles: int, threads: int) -> BaseBatch:
+        """The solver."""
+        return BatchSolver(settings.robot, count, obstacles, threads)
+
+    def bounds(self, settings: InsertionSettings) -> tuple[np.ndarray, np.ndarray]:
+        """Of the cable, and of the length."""
+        shortest, longest = settings.robot.lengths_mm
+        return np.array([0.0, shortest]), np.array([settings.cable_limit_mm, longest])
+
+    def increments(self, settings: InsertionSettings) -> np.ndarray:
+        """Of the cable, and of the insertion."""
+        return np.array([settings.max_increment_mm, settings.max_insertion_mm])
+
+    effort, command, square = Body.effort, Body.command, Body.square  # of two numbers
+
+    def told(self, blocks: np.ndarray, which: int | slice) -> dict[str, Any]:
+        """The length of the robot beside them."""
+        return super().told(blocks, which) | {"length_mm": plain(blocks[..., LENGTH], which)}
+
+    def poses(self, robot: Robot, layout: Layout) -> Seen:
+        """The length of the robot beside them."""
+        return super().poses(robot, layout) | {"length": (np.array([LENGTH]), 1 / robot.lengths_mm[1])}
+
+
 class Space(Body):
     """Two pairs of cables in space."""
 
-    model, settings, place = SPACE, SpatialSettings, slice(0, 2)
+    model, settings, actions, place = SPACE, SpatialSettings, 2, slice(0, 2)
     obstacle_size = 7
 
     def batch(self, settings: SpatialSettings, count: int, obstacles: int, threads: int) -> BaseBatch:
         """The solver."""
         return SpatialBatchSolver(settings.robot, count, obstacles, threads)
 
-    def effort(self, actions: np.ndarray) -> Any:
-        """``(..., 2)``."""
-        return np.minimum(np.maximum(actions.astype(float), -1.0), 1.0)
-
-    def command(self, blocks: np.ndarray, effort: Any, which: Which, settings: SpatialSettings) -> Any:
-        """Displacements within the limit on both sides."""
-        limit = settings.cable_limit_mm
-        command = blocks[which, self.place] + effort * settings.max_increment_mm
-        return np.minimum(np.maximum(command, -limit), limit)
-
-    def square(self, effort: Any) -> Any:
-        """The mean of both squares."""
-        return (effort[..., 0] * effort[..., 0] + effort[..., 1] * effort[..., 1]) / 2
+    def bounds(self, settings: SpatialSettings) -> tuple[np.ndarray, np.ndarray]:
+        """Of both displacements, either way."""
+        limit = np.full(2, settings.cable_limit_mm)
+        return -limit, limit
 
     def estimate(
         self, blocks: np.ndarray, layout: Layout, force_true: np.ndarray, which: int | slice, settings: SpatialSettings
@@ -199,4 +235,4 @@ def plain(value: Any, which: Which) -> Any:
     return value.item() if isinstance(which, int) else value.copy()
 
 
-IN_PLANE, IN_SPACE = Plane(), Space()
+IN_PLANE, INSERTED, IN_SPACE = Plane(), Insertion(), Space()

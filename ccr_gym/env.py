@@ -7,11 +7,12 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
+from ccr_gym.checks import require
 from ccr_gym.fleet import Fleet, Reading
 from ccr_gym.observation import FORCE_SCALE_N
 from ccr_gym.rendering import Frame, Renderer, draw_plane
 from ccr_gym.reward import TERMS
-from ccr_gym.settings import Settings, require
+from ccr_gym.settings import Settings
 from ccr_gym.spatial_rendering import draw_space
 from ccr_gym.tasks import Assignment, Task
 
@@ -60,7 +61,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         """
         super().reset(seed=seed)
         if options:
-            self._fleet.give(0, _assignment(options, self.task))
+            self._fleet.give(0, _assignment(options, self.task), self.np_random)
         else:
             self._fleet.draw([0], [self.np_random])
         self._started = True
@@ -122,7 +123,7 @@ def single_spaces(fleet: Fleet, settings: Settings) -> tuple[spaces.Space[Any], 
     """Spaces of what one environment shows and takes."""
     flat = settings.obs_mode == "flat"
     return fleet.observer.flat_space if flat else fleet.observer.dict_space, spaces.Box(
-        -1.0, 1.0, (fleet.body.model.cables,), np.float32
+        -1.0, 1.0, (fleet.body.actions,), np.float32
     )
 
 

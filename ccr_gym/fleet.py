@@ -9,10 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ccr_gym.bodies import Which, plain
-from ccr_gym.observation import Observer
+from ccr_gym.checks import require
+from ccr_gym.observation import AHEAD, Observer
 from ccr_gym.reward import TERMS, reward_terms
-from ccr_gym.settings import Settings, require
-from ccr_gym.tasks import Assignment, Task, assign
+from ccr_gym.sensing import Senses
+from ccr_gym.settings import Settings
+from ccr_gym.tasks import COURSE_STEPS, Assignment, Task, assign
 from solver.layout import SPACE
 from solver.solve import Solver
 from solver.spatial import SpatialSolver
@@ -25,12 +27,11 @@ class Reading(NamedTuple):
 
     Attributes:
         blocks: Their equilibria, ``(..., size)``.
-        force_true: Contact force on the robot, ``(..., d)`` [N].
+        force_true: Contact force that counts, on the robot, ``(..., d)`` [N].
         force_est: The same by virtual work, ``(..., d)`` [N].
         force: Magnitude of the true one [N].
         desired: Magnitude of the set-point [N].
         goal: The set-point, its magnitude or ``(..., d)`` [N].
-        lacking: Set-point minus measured, of magnitudes or ``(..., d)`` [N].
         error: Relative force error.
     """
 
@@ -40,7 +41,6 @@ class Reading(NamedTuple):
     force: Any
     desired: Any
     goal: Any
-    lacking: Any
     error: Any
 
 
@@ -57,80 +57,126 @@ class Fleet:
     def __init__(self, task: Task, settings: Settings, count: int, threads: int = 1) -> None:
         self._task, self._settings, self.body = task, settings, task.body
         self.count, self._threads = count, threads
-        space, cables = self.body.model.space, self.body.model.cables
-        self.desired = np.ones(count)
-        self._goals = np.ones((count, space))  # set-points that are vectors
-        self._effort = np.zeros(count) if cables == 1 else np.zeros((count, cables))
+        self.peaks = np.ones(count)  # magnitude of the set-point, or the highest of one that moves
+        self._courses = np.ones((count, COURSE_STEPS)) if task.moving else None
+        self._goals = np.ones((count, self.body.model.space))  # set-points that are vectors
+        self._effort = np.zeros(count) if self.body.actions == 1 else np.zeros((count, self.body.actions))
         self._seen = np.zeros((count, self.body.obstacle_size))
+        self._time = np.zeros(count, int)  # steps of the episode
         self._enter(task.obstacles)
 
     def _enter(self, obstacles: int) -> None:
         """Make room for scenes of so many obstacles."""
         self.solver = self.body.batch(self._settings, self.count, obstacles, self._threads)
         self._layout = self.solver.layout
-        self.observer = Observer(self.body, self._settings, self._layout, self._task.force_vector)
+        self.observer = Observer(self.body, self._settings, self._layout, self._task)
+        senses = self._settings.senses
+        self._senses = Senses(senses, self.count, self.body, self.observer.delayed) if senses else None
 
     def draw(self, robots: Sequence[int], generators: Sequence[np.random.Generator]) -> None:
         """Start new episodes of some robots, each drawn by its own generator."""
-        forces = assign(self._task, self.solver, robots, generators, self._settings.cable_limit_mm)
-        self._aim(robots, forces)
+        settings = self._settings
+        forces, drawn = assign(self._task, self.solver, robots, generators, settings.cable_limit_mm, settings.split)
+        self._begin(robots, forces, drawn, generators)
 
-    def give(self, robot: int, assignment: Assignment) -> None:
-        """Start a given episode of a robot.
+    def give(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
+        """Start a given episode of a robot; what else there is of it is drawn by its generator.
 
         Raises:
             ValueError: As the solver; the episode goes on as it was.
         """
         solver: Any = SpatialSolver if self.body.model is SPACE else Solver
         solver(self._settings.robot, assignment.scene)
+        least = 1 if self._task.target is None else self._task.target + 1
+        require(len(assignment.scene) >= least, f"the scene has {len(assignment.scene)} obstacles; it needs {least}")
         if len(assignment.scene) != self._layout.obstacles:
             require(self.count == 1, f"all scenes of several robots must have {self._layout.obstacles} obstacles")
             self._enter(len(assignment.scene))
         self.solver.assign(robot, assignment.scene)
-        self._aim([robot], np.atleast_2d(assignment.desired_force))
+        self._begin([robot], np.atleast_2d(assignment.desired_force), [assignment], [generator])
 
-    def _aim(self, robots: Sequence[int], forces: np.ndarray) -> None:
+    def _begin(
+        self,
+        robots: Sequence[int],
+        forces: np.ndarray,
+        assignments: Sequence[Assignment],
+        generators: Sequence[np.random.Generator],
+    ) -> None:
         """Begin episodes with set-points, magnitudes ``(k, 1)`` or vectors ``(k, d)`` [N]."""
-        self.desired[robots] = forces[:, 0]
+        self.peaks[robots] = forces[:, 0]
         if self._task.force_vector:
             self._goals[robots] = forces
-            self.desired[robots] = _norm(forces)
+            self.peaks[robots] = _norm(forces)
         self.solver.rest(robots)
-        self._effort[robots] = 0.0
-        for robot in robots if self.body.obstacle_size else ():
-            self._seen[robot] = self.body.obstacle(self.solver.scene(robot))
+        self._effort[robots], self._time[robots] = 0.0, 0
+        if self._courses is None and self._senses is None and not self.body.obstacle_size:
+            return
+        for robot, assignment, generator in zip(robots, assignments, generators, strict=True):
+            if self._courses is not None:
+                self._courses[robot] = 1.0 if assignment.course is None else assignment.course
+            if self._senses is not None:
+                self._senses.begin(robot, generator, self.solver.blocks[robot, self.body.place])
+            if self.body.obstacle_size:
+                self._seen[robot] = self.body.obstacle(assignment.scene)
 
     def step(self, effort: Any, which: Which = ALL) -> None:
-        """Move the cables of all robots, or of some, by ``effort · max_increment_mm``.
+        """Move what the actions of all robots, or of some, move, by ``effort`` times its full increment.
 
         Args:
-            effort: Normalised cable increments of these robots, as :meth:`ccr_gym.bodies.Body.effort` gives them.
+            effort: Normalised increments of these robots, as :meth:`ccr_gym.bodies.Body.effort` gives them.
             which: One robot, a list of them, or all.
         """
-        body, solver = self.body, self.solver
-        solver.commands[which, body.place] = body.command(solver.blocks, effort, which, self._settings)
+        body, solver, settings = self.body, self.solver, self._settings
+        if self._senses is None:
+            solver.commands[which, body.place] = body.command(solver.blocks, effort, which, settings)
+        else:
+            solver.commands[which, body.place] = self._senses.drive(
+                solver.blocks[which, body.place], effort * body.increments(settings), body.bounds(settings), which
+            )
         self._effort[which] = effort
+        self._time[which] += 1
         solver.move(which)
 
     def read(self, which: int | slice = ALL) -> Reading:
         """What one robot or all of them feel now."""
-        blocks = self.solver.blocks[which]
-        force_true = self._layout.force(blocks).copy()
-        force, desired = plain(_norm(force_true), which), plain(self.desired[which], which)
+        blocks, target = self.solver.blocks[which], self._task.target
+        forces = self._layout.force(blocks) if target is None else self._layout.forces(blocks)[..., target, :]
+        force_true = forces.copy()
         force_est = self.body.estimate(blocks, self._layout, force_true, which, self._settings)
+        if self._senses is not None:
+            stiffness = np.asarray(self._senses.stiffness[which])[..., None]
+            force_true *= stiffness
+            force_est *= stiffness * np.asarray(self._senses.grip[which])[..., None]
+        force, desired = plain(_norm(force_true), which), self._desired(0, which)
         if self._task.force_vector:
             goal = self._goals[which].copy()
-            lacking = goal - force_true
-            error = plain(_norm(lacking), which) / desired
+            error = plain(_norm(goal - force_true), which) / desired
         else:
-            goal, lacking = desired, desired - force
-            error = abs(lacking) / desired
-        return Reading(blocks, force_true, force_est, force, desired, goal, lacking, error)
+            goal, error = desired, abs(force - desired) / desired
+        return Reading(blocks, force_true, force_est, force, desired, goal, error)
+
+    def _desired(self, ahead: int, which: int | slice) -> Any:
+        """Magnitude of the set-point some steps ahead [N]."""
+        if self._courses is None:
+            return plain(self.peaks[which], which)
+        robots, time = np.arange(self.count)[which], np.minimum(self._time[which] + ahead, COURSE_STEPS - 1)
+        return plain(self.peaks[which] * self._courses[robots, time], which)
 
     def observe(self, reading: Reading, which: int | slice = ALL) -> np.ndarray:
         """What is seen, in the flat form, ``(k,)`` or ``(N, k)`` float32."""
-        told = {"desired_force": reading.goal, "force_error": reading.lacking, "force_est": reading.force_est}
-        return self.observer.flat(reading.blocks, told, self._seen[which])
+        told = {"desired_force": reading.goal, "force_est": reading.force_est}
+        if self._courses is not None:
+            told["desired_ahead"] = np.stack([self._desired(steps, which) for steps in AHEAD], axis=-1)
+        measured = reading.force_true
+        if self._senses is not None:
+            measured = told["force_measured"] = measured + self._senses.noise(self._time, which)
+        size = reading.force if self._senses is None else plain(_norm(measured), which)
+        told["force_error"] = reading.goal - (measured if self._task.force_vector else size)
+        rows = self.observer.rows(reading.blocks, told, self._seen[which])
+        if self._senses is not None:
+            rows = self._senses.late(rows, self._time, which)
+            self.observer.correct(rows, self._senses.motors(which))
+        return self.observer.bounded(rows)
 
     def rewards(self, reading: Reading, which: int | slice = ALL) -> tuple[Any, ...]:
         """Terms of the reward of the last step."""

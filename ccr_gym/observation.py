@@ -6,10 +6,12 @@ import numpy as np
 from gymnasium import spaces
 
 from ccr_gym.bodies import Body, Seen
+from ccr_gym.sensing import DELAYED
 from ccr_gym.settings import Settings
 from solver.layout import Layout
 
 FORCE_SCALE_N = 0.5  # force that an observation of 1 stands for
+AHEAD = (2, 4, 8)  # steps that a moving set-point is seen ahead
 SENSOR_KEYS = ("force_error", "force_measured")  # seen with a force sensor only
 
 
@@ -20,23 +22,34 @@ class Observer:
         body: The model of the robot.
         settings: What the environment was told.
         layout: Where the numbers of an equilibrium stand in its block.
-        force_vector: Whether the set-point is a vector.
+        task: What an episode asks.
     """
 
-    def __init__(self, body: Body, settings: Settings, layout: Layout, force_vector: bool) -> None:
+    def __init__(self, body: Body, settings: Settings, layout: Layout, task: Any) -> None:
         numbers, space = np.arange(layout.size), body.model.space
-        goal = space if force_vector else 1
+        goal = space if task.force_vector else 1
+        forces = layout.force(numbers) if task.target is None else layout.forces(numbers)[task.target]
         signed = -1.0 if body.model.cables > 1 else 0.0
         seen: Seen = {  # what is a number of the block, and its scale
             "cable": (layout.cables(numbers), 1 / settings.cable_limit_mm),
             "contact": (layout.flags(numbers), 1.0),
-            "force_measured": (layout.force(numbers), 1 / FORCE_SCALE_N),
+            "force_measured": (forces, 1 / FORCE_SCALE_N),
             **body.poses(settings.robot, layout),
         }
         told = {"desired_force": goal, "force_error": goal, "force_est": space}
+        if task.moving:
+            told["desired_ahead"] = len(AHEAD)
+        if settings.senses:
+            told["force_measured"] = space
         if body.obstacle_size:
             told["obstacle"] = body.obstacle_size
-        lowest = {"cable": signed, "contact": 0.0, "desired_force": 0.0 if goal == 1 else -1.0}
+        lowest = {
+            "length": 0.0,
+            "desired_ahead": 0.0,
+            "cable": signed,
+            "contact": 0.0,
+            "desired_force": 0.0 if goal == 1 else -1.0,
+        }
         sizes = {key: source.size for key, (source, _) in seen.items()} | told
         keys = [key for key in sorted(sizes) if settings.force_sensor or key not in SENSOR_KEYS]
         self.dict_space = spaces.Dict({key: _box(lowest.get(key, -1.0), (sizes[key],)) for key in keys})
@@ -50,14 +63,18 @@ class Observer:
             key: self._places[key] if told[key] > 1 else self._places[key].start for key in told if key in keys
         }
         self._source, self._scale = np.zeros(self._low.size, int), np.zeros(self._low.size)
+        self.delayed = np.zeros(self._low.size, bool)
+        for key in DELAYED:
+            self.delayed[self._places.get(key, slice(0))] = True
+        self._motors = {key: self._places[key] for key in ("cable", "length") if key in self._places}
         for key in seen.keys() & keys:
             source, scale = seen[key]
             self._source[self._places[key]], self._scale[self._places[key]] = source.ravel(), scale
         self._obstacle_scale = np.ones(body.obstacle_size)
         self._obstacle_scale[:3] = 1 / settings.robot.length_mm
 
-    def flat(self, blocks: np.ndarray, told: dict[str, Any], obstacle: np.ndarray) -> np.ndarray:
-        """The flat form of one robot, ``(k,)`` float32, or of many, ``(N, k)``.
+    def rows(self, blocks: np.ndarray, told: dict[str, Any], obstacle: np.ndarray) -> np.ndarray:
+        """The flat form of one robot, ``(k,)``, or of many, ``(N, k)``, before it is bounded.
 
         Args:
             blocks: Equilibrium, ``(size,)`` or ``(N, size)``.
@@ -71,6 +88,18 @@ class Observer:
                 rows[..., self._told[key]] = force / FORCE_SCALE_N
         if "obstacle" in self._told:
             rows[..., self._told["obstacle"]] = obstacle * self._obstacle_scale
+        return rows
+
+    def correct(self, rows: np.ndarray, motors: np.ndarray) -> None:
+        """Put what the motors tell in the place of what they move, ``(..., actions)`` [mm]."""
+        start = 0
+        for place in self._motors.values():
+            count = place.stop - place.start
+            rows[..., place] = motors[..., start : start + count] * self._scale[place]
+            start += count
+
+    def bounded(self, rows: np.ndarray) -> np.ndarray:
+        """Rows within the bounds of the space, as float32; the rows are overwritten."""
         np.maximum(rows, self._low, out=rows)
         np.minimum(rows, self._high, out=rows)
         return rows.astype(np.float32)

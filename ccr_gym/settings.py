@@ -3,7 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
+from ccr_gym.checks import require
 from ccr_gym.reward import RewardWeights
+from ccr_gym.sensing import Sensing
 from solver import Robot
 from solver.spatial import SpatialRobot
 
@@ -22,6 +24,9 @@ class Settings:
         force_limit: Contact force above which ``info["cost"]`` counts [N].
         weights: Weights of the reward terms; a mapping of names to numbers is taken as well.
         backend: ``"native"``, or ``"casadi"`` for the reference solver (slow).
+        sensing: ``"ideal"``, ``"realistic"``, or the ranges of what is not ideal, as :class:`ccr_gym.sensing.Sensing` or a
+            mapping of its fields.
+        split: Which scenes are drawn: ``"train"``, ``"test"``, which no training scene is in, or ``"all"``.
 
     Raises:
         ValueError: If an argument is out of range; the message names the bound.
@@ -38,8 +43,15 @@ class Settings:
     force_limit: float = 0.3
     weights: RewardWeights = field(default_factory=RewardWeights)
     backend: Literal["native", "casadi"] = "native"
+    sensing: Any = "ideal"
+    split: Literal["all", "train", "test"] = "all"
 
     def __post_init__(self) -> None:
+        if isinstance(self.sensing, dict):
+            object.__setattr__(self, "sensing", Sensing(**self.sensing))
+        known = isinstance(self.sensing, Sensing) or self.sensing in ("ideal", "realistic")
+        require(known, f"sensing is {self.sensing!r}; it must be 'ideal', 'realistic' or the fields of a Sensing")
+        require(self.split in ("all", "train", "test"), f"split is {self.split!r}; it must be 'all', 'train' or 'test'")
         given: Any = self.robot
         if given is None or isinstance(given, dict):
             object.__setattr__(self, "robot", self.kind(**given) if given else self.kind.prototype())
@@ -57,6 +69,36 @@ class Settings:
             f"max_increment_mm is {self.max_increment_mm}; it must be positive and at most cable_limit_mm",
         )
         require(self.force_limit > 0, f"force_limit is {self.force_limit}; it must be positive")
+
+    @property
+    def senses(self) -> Sensing | None:
+        """What is not ideal, if anything is."""
+        if self.sensing == "realistic":
+            return Sensing()
+        return self.sensing if isinstance(self.sensing, Sensing) else None
+
+
+def _insertable() -> Robot:
+    return Robot(length_mm=160.0, segments=18, offset_mm=8.0, cable="sliding", length_range_mm=(140.0, 180.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InsertionSettings(Settings):
+    """The same with a base that inserts the robot.
+
+    Attributes:
+        robot: A robot with a ``length_range_mm``; 160 mm long and inserted to 140–180 mm by default, its cable sliding.
+        max_insertion_mm: Insertion of a full action [mm].
+    """
+
+    robot: Any = field(default_factory=_insertable)
+    max_insertion_mm: float = 1.0
+
+    def __post_init__(self) -> None:
+        Settings.__post_init__(self)
+        require(self.robot.length_range_mm is not None, "robot has no length_range_mm; give the lengths of insertion")
+        require(self.max_insertion_mm > 0, f"max_insertion_mm is {self.max_insertion_mm}; it must be positive")
+        require(self.backend == "native", f"backend is {self.backend!r}; with insertion it must be 'native'")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,13 +120,3 @@ class SpatialSettings(Settings):
     def __post_init__(self) -> None:
         Settings.__post_init__(self)
         require(self.backend == "native", f"backend is {self.backend!r}; in space it must be 'native'")
-
-
-def require(condition: bool, message: str) -> None:
-    """Refuse what does not meet a condition.
-
-    Raises:
-        ValueError: With the message.
-    """
-    if not condition:
-        raise ValueError(message)

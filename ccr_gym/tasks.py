@@ -1,19 +1,23 @@
 """What an episode asks: the obstacles and the force to push them with."""
 
 import math
+import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ccr_gym.bodies import IN_PLANE, IN_SPACE, Body
+from ccr_gym.bodies import IN_PLANE, IN_SPACE, INSERTED, Body
 from solver import Circle, HalfPlane, Robot, Scene
 from solver.batch import BaseBatch
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
 MAX_DRAWS = 1000
 HALF_CYLINDER_MM = 30.0
+COURSE_STEPS = 128  # of a set-point that moves
+TEST_SHARE = 5  # one scene in so many is a test scene
 PROBE_MM = 0.5  # cable displacement between the equilibria of a trial pull
 
 
@@ -24,35 +28,39 @@ class Assignment(NamedTuple):
         scene: The obstacles.
         desired_force: Set-point, the magnitude of the force on the robot or the force itself [N].
         pull: Displacements of the cables per millimetre of the steady pull that shows that it can be reached.
+        course: Of a set-point that moves, its part of the desired force at every step, the last one for good.
     """
 
     scene: Scene
     desired_force: float | np.ndarray
     pull: tuple[float, ...] = (1.0,)
+    course: np.ndarray | None = None
 
 
-class Task(Protocol):
+class Task(ABC):
     """A distribution over assignments.
 
     Attributes:
         body: The model of its robots.
         obstacles: Number of obstacles of every scene.
+        target: The obstacle whose contact force is asked for; ``None`` for all together.
         force_vector: Whether the set-point is a vector: the force that the trial pull gets to.
+        moving: Whether the set-point moves, and is seen ahead.
     """
 
-    body: ClassVar[Body]
-    obstacles: ClassVar[int]
+    body: ClassVar[Body] = IN_PLANE
+    obstacles: ClassVar[int] = 1
+    target: ClassVar[int | None] = None
+    force_vector: ClassVar[bool] = False
+    moving: ClassVar[bool] = False
 
-    @property
-    def force_vector(self) -> bool:
-        """As above."""
-
+    @abstractmethod
     def draw(self, robot: Any, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
 
 
 @dataclass(frozen=True, slots=True)
-class LoadCell:
+class LoadCell(Task):
     """The paper's experiment (Fig. 8–10): a flat load cell beside the robot that only its 15th node meets (eq. 12).
 
     Attributes:
@@ -60,10 +68,6 @@ class LoadCell:
         height_mm: Its height above the base [mm].
         force_n: Range of the desired force [N].
     """
-
-    body: ClassVar[Body] = IN_PLANE
-    obstacles: ClassVar[int] = 1
-    force_vector: ClassVar[bool] = False
 
     distance_mm: tuple[float, float] = (24.0, 51.0)
     height_mm: float = 127.0
@@ -78,7 +82,7 @@ class LoadCell:
 
 
 @dataclass(frozen=True, slots=True)
-class PushObstacle:
+class PushObstacle(Task):
     """A circular obstacle somewhere in front of the robot.
 
     Attributes:
@@ -87,10 +91,6 @@ class PushObstacle:
         radius_mm: Range of its radius [mm].
         force_n: Range of the desired force [N].
     """
-
-    body: ClassVar[Body] = IN_PLANE
-    obstacles: ClassVar[int] = 1
-    force_vector: ClassVar[bool] = False
 
     x_mm: tuple[float, float] = (35.0, 75.0)
     y_mm: tuple[float, float] = (75.0, 150.0)
@@ -104,7 +104,86 @@ class PushObstacle:
 
 
 @dataclass(frozen=True, slots=True)
-class SpatialPush:
+class TrackForce(PushObstacle):
+    """The same with a set-point that steps and swings, and is seen some steps ahead.
+
+    Attributes:
+        steps: Largest number of steps of the set-point in an episode.
+        swing: Range of its swing's amplitude, over its level.
+        period: Range of the swing's period [steps].
+    """
+
+    moving: ClassVar[bool] = True
+
+    steps: int = 3
+    swing: tuple[float, float] = (0.1, 0.4)
+    period: tuple[float, float] = (24.0, 64.0)
+
+    def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
+        """A scene, the highest force, and the way to it."""
+        drawn = PushObstacle.draw(self, robot, generator)
+        swing, period, phase, _ = uniform(generator, self.swing, self.period, (0.0, 2 * math.pi), (0.0, 1.0))
+        times = np.sort(generator.uniform(0, COURSE_STEPS, self.steps))
+        levels = generator.uniform(0.3, 1.0, self.steps + 1)
+        now = np.arange(COURSE_STEPS)
+        course = levels[np.searchsorted(times, now)] * (1 + swing * np.sin(2 * math.pi * now / period + phase))
+        return drawn._replace(course=course / course.max())
+
+
+@dataclass(frozen=True, slots=True)
+class BracedPush(Task):
+    """Two circular obstacles, as in the paper's Fig. 4b: the robot braces on the lower one and pushes the upper one.
+
+    Attributes:
+        brace_mm: Ranges of x, y and radius of the lower one [mm].
+        goal_mm: Ranges of x, y and radius of the upper one, whose contact force is asked for [mm].
+        force_n: Range of the desired force [N].
+    """
+
+    obstacles: ClassVar[int] = 2
+    target: ClassVar[int | None] = 1
+
+    brace_mm: tuple[tuple[float, float], ...] = ((27.0, 38.0), (75.0, 95.0), (10.0, 14.0))
+    goal_mm: tuple[tuple[float, float], ...] = ((52.0, 72.0), (125.0, 150.0), (12.0, 16.0))
+    force_n: tuple[float, float] = (0.02, 0.12)
+
+    def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
+        """A scene and a desired force."""
+        x, y, radius, goal_x, goal_y, goal_radius, force = uniform(
+            generator, *self.brace_mm, *self.goal_mm, self.force_n
+        )
+        goal = Circle(center=(goal_x, goal_y), radius=goal_radius)
+        return Assignment(Scene([Circle(center=(x, y), radius=radius), goal]), force)
+
+
+@dataclass(frozen=True, slots=True)
+class SoftObstacle(PushObstacle):
+    """A circular obstacle on a spring of unknown stiffness, which gives way when it is pushed.
+
+    Attributes:
+        stiffness: Range of the spring's stiffness, drawn evenly in its logarithm [N/mm].
+    """
+
+    stiffness: tuple[float, float] = (0.003, 0.1)
+
+    def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
+        """A scene and a desired force."""
+        drawn = PushObstacle.draw(self, robot, generator)
+        (exponent,) = uniform(generator, (math.log(self.stiffness[0]), math.log(self.stiffness[1])))
+        return drawn._replace(scene=Scene(replace(o, stiffness=math.exp(exponent)) for o in drawn.scene))
+
+
+@dataclass(frozen=True, slots=True)
+class InsertAndPush(PushObstacle):
+    """A circular obstacle, pushed with the cable and with the insertion of the base."""
+
+    body: ClassVar[Body] = INSERTED
+
+    y_mm: tuple[float, float] = (75.0, 130.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SpatialPush(Task):
     """A sphere or a cylinder somewhere around the robot.
 
     Attributes:
@@ -120,7 +199,6 @@ class SpatialPush:
     """
 
     body: ClassVar[Body] = IN_SPACE
-    obstacles: ClassVar[int] = 1
 
     distance_mm: tuple[float, float] = (35.0, 65.0)
     height_mm: tuple[float, float] = (80.0, 150.0)
@@ -128,7 +206,7 @@ class SpatialPush:
     cylinders: float = 0.5
     tilt: float = math.pi / 6
     force_n: tuple[float, float] = (0.02, 0.15)
-    force_vector: bool = False
+    force_vector: bool = False  # type: ignore[misc] - a choice here
     aside: float = 0.25
 
     def draw(self, robot: SpatialRobot, generator: np.random.Generator) -> Assignment:
@@ -163,7 +241,8 @@ def assign(
     robots: Sequence[int],
     generators: Sequence[np.random.Generator],
     cable_limit_mm: float,
-) -> np.ndarray:
+    split: str = "all",
+) -> tuple[np.ndarray, list[Assignment]]:
     """Give some robots scenes and desired forces, each drawn by its own generator.
 
     Draws again until the force can be reached by pulling steadily, without a stall, jam or snap on the way.
@@ -174,28 +253,44 @@ def assign(
         robots: Which.
         generators: One for each of them.
         cable_limit_mm: Largest cable displacement that may be needed [mm].
+        split: ``"all"``, ``"train"`` or ``"test"`` scenes.
 
     Returns:
-        Desired force of each, ``(k, 1)``, or ``(k, d)`` where a vector is asked for [N].
+        Desired force of each, ``(k, 1)``, or ``(k, d)`` where a vector is asked for [N], and what was drawn.
 
     Raises:
         RuntimeError: If no draw of many is feasible: the task and the robot do not fit.
     """
     desired = np.zeros((len(robots), solver.model.space if task.force_vector else 1))
+    assignments: list[Any] = [None] * len(robots)
     waiting = list(range(len(robots)))
     for _ in range(MAX_DRAWS):
-        drawn = [task.draw(solver.robot, generators[k]) for k in waiting]
+        drawn = [_draw(task, solver.robot, generators[k], split) for k in waiting]
         for k, assignment in zip(waiting, drawn, strict=True):
             solver.assign(robots[k], assignment.scene)
+            assignments[k] = assignment
         names = [robots[k] for k in waiting]
         forces = np.array([assignment.desired_force for assignment in drawn], float)
         pulls = np.array([assignment.pull for assignment in drawn])
-        found, reached = solver.reaches(names, forces, PROBE_MM, cable_limit_mm, pulls)
+        found, reached = solver.reaches(names, forces, PROBE_MM, cable_limit_mm, pulls, task.target)
         desired[waiting] = reached if task.force_vector else forces[:, None]
         waiting = [k for k, success in zip(waiting, found, strict=True) if not success]
         if not waiting:
-            return desired
+            return desired, assignments
     raise RuntimeError(
         f"none of {MAX_DRAWS} draws of {task} can be pushed as desired within {cable_limit_mm} mm of cable; "
         "widen the task's ranges or the cable limit"
     )
+
+
+def in_test_split(scene: Scene) -> bool:
+    """Whether a scene is one of the test scenes: a fixed fifth of all there are, told by the numbers of their shapes."""
+    return zlib.crc32(np.array(scene.parameters).tobytes()) % TEST_SHARE == 0
+
+
+def _draw(task: Task, robot: Any, generator: np.random.Generator, split: str) -> Assignment:
+    """The next assignment of a split."""
+    while True:
+        drawn = task.draw(robot, generator)
+        if split == "all" or in_test_split(drawn.scene) == (split == "test"):
+            return drawn

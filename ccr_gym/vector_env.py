@@ -8,10 +8,10 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from ccr_gym.checks import require
 from ccr_gym.env import METADATA, Observation, single_spaces
 from ccr_gym.fleet import Fleet
 from ccr_gym.reward import TERMS
-from ccr_gym.settings import require
 from ccr_gym.tasks import Task
 
 Infos = dict[str, Any]

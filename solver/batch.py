@@ -117,6 +117,7 @@ class BaseBatch(ABC):
         increment_mm: float,
         limit_mm: float,
         directions: np.ndarray | None = None,
+        obstacle: int | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Whether pulling some robots steadily from rest gets each to a contact force, and the force it gets to.
 
@@ -128,6 +129,7 @@ class BaseBatch(ABC):
             increment_mm: Cable displacement of a step [mm].
             limit_mm: Bound on the cable displacement [mm].
             directions: Displacements of the cables per millimetre of pull, ``(k, cables)``; ``None`` for ones.
+            obstacle: The obstacle whose contact force is meant; ``None`` for all together.
 
         Returns:
             ``(k,)`` bool, and the contact force on each robot at the end of its pull, ``(k, d)`` [N].
@@ -136,7 +138,8 @@ class BaseBatch(ABC):
         directions = np.ones((len(forces), self.model.cables)) if directions is None else directions
         length = self.robot.length_mm
         reached = np.zeros((len(forces), self.model.space))
-        found = self._fleet.reaches(list(robots), forces, directions, increment_mm, limit_mm, length, reached)
+        target = -1 if obstacle is None else obstacle
+        found = self._fleet.reaches(list(robots), forces, target, directions, increment_mm, limit_mm, length, reached)
         return np.array(found, bool), reached
 
     def scene(self, index: int) -> Scene:

@@ -149,7 +149,7 @@ class Fleet {
     });
   }
 
-  std::vector<int> reaches(const std::vector<int>& robots, const Values& forces, const Table& directions,
+  std::vector<int> reaches(const std::vector<int>& robots, const Values& forces, int obstacle, const Table& directions,
                            double increment, double limit, double length, const Blocks& reached) {
     if (forces.shape(0) != robots.size() || directions.shape(0) != robots.size() || directions.shape(1) != D - 1 ||
         reached.shape(0) != robots.size() || reached.shape(1) != D)
@@ -160,7 +160,7 @@ class Fleet {
     double* to = reached.data();
     nb::gil_scoped_release released;
     batch_.each(robots, [&](ccr::Follower<D>& follower, int k) {
-      found[k] = follower.reaches(force[k], direction + (D - 1) * k, increment, limit, length, to + D * k);
+      found[k] = follower.reaches(force[k], obstacle, direction + (D - 1) * k, increment, limit, length, to + D * k);
     });
     return found;
   }
@@ -208,13 +208,14 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
            "robot"_a, "scene"_a, "Put a robot among other obstacles; its block stays as it is.")
       .def("step", &Fleet<D>::step, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a,
            "Move some robots to their commands (cables, length), in place.")
-      .def("reaches", &Fleet<D>::reaches, "robots"_a, "forces"_a, "directions"_a, "increment"_a, "limit"_a, "length"_a,
+      .def("reaches", &Fleet<D>::reaches, "robots"_a, "forces"_a, "obstacle"_a, "directions"_a, "increment"_a, "limit"_a, "length"_a,
            "reached"_a, "Whether steady pulls of some robots from rest, along directions, reach their forces without an event.");
 }
 
 }  // namespace
 
 NB_MODULE(_kernel, m) {
+  nb::set_leak_warnings(false);  // of objects that caches keep until the interpreter ends
   m.doc() = "Chain solver: Riccati-Newton SQP on the reduced coordinates, followed along a branch.";
   m.attr("SHAPES") = ccr::kShapeNames;
   m.attr("SHAPE_SIZE") = ccr::kShapeSize;

@@ -551,8 +551,8 @@ Status Branch<Model>::follow(const double* from, const double* target, double* t
 }
 
 template <class Model>
-bool Branch<Model>::reaches(double force, const double* direction, double increment, double limit, double length,
-                            double* reached) {
+bool Branch<Model>::reaches(double force, int obstacle, const double* direction, double increment, double limit,
+                            double length, double* reached) {
   std::fill_n(reached, kSpace, 0.0);
   Command command{{}, length};
   std::vector<double> rest(block_size());
@@ -568,7 +568,8 @@ bool Branch<Model>::reaches(double force, const double* direction, double increm
     if (follow(command) != Status::kConverged) return false;
     settle();
     Position total{};
-    for (int j = 0; j < obstacles; ++j) total += newton_.chain.push(present_.active, j);
+    for (int j = 0; j < obstacles; ++j)
+      if (obstacle < 0 || j == obstacle) total += newton_.chain.push(present_.active, j);
     std::copy_n(total.v.begin(), kSpace, reached);
     if (newton_.chain.touching(present_.active) && norm(total) >= force) return true;
   }

@@ -36,9 +36,9 @@ class Follower {
   virtual Status follow(const double* from, const double* target, double* to) = 0;
 
   // Whether steady pulls from rest, of this increment along a direction and to less than this limit, reach a contact force
-  // without an event on the way; false as well when the robot at rest is not clear of the obstacles. Writes the force
-  // reached last, all obstacles together, to `reached`.
-  virtual bool reaches(double force, const double* direction, double increment, double limit, double length,
+  // on one of the obstacles, or with -1 on all together, without an event on the way; false as well when the robot at rest
+  // is not clear of them. Writes the force reached last to `reached`.
+  virtual bool reaches(double force, int obstacle, const double* direction, double increment, double limit, double length,
                        double* reached) = 0;
 
   int iterations = 0;                    // of Newton's method in the last follow
@@ -78,7 +78,7 @@ class Branch : public Follower<Model::kSpace> {
   std::size_t block_size() const override;
   void enter(std::span<const Obstacle<kSpace>> obstacles) override;
   Status follow(const double* from, const double* target, double* to) override;
-  bool reaches(double force, const double* direction, double increment, double limit, double length,
+  bool reaches(double force, int obstacle, const double* direction, double increment, double limit, double length,
                double* reached) override;
 
  private:

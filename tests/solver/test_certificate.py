@@ -52,7 +52,7 @@ def test_residuals_of_every_shape(random_shapes, cable, touch):
         springs += any(scene.mounted)
         changes = generator.uniform(-0.2, 0.6, 40)
         states = list(follow(Solver(robot, scene), np.column_stack([changes, np.zeros(40)])))
-        certify(states)
+        certify(states[::3])
         touched |= {scene.laws[j] for state in states for j in state.contact.any(axis=(1, 2)).nonzero()[0]}
     assert touched > set(GAP_LAWS)  # and a custom shape
     assert springs > 10

@@ -92,13 +92,13 @@ def test_quarter_turns_take_other_cables(quarters, robot, turned, walk):
     assert there.nodes == pytest.approx(turned(here.nodes, angle), abs=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=12, deadline=None, derandomize=True, database=None)
 @given(seed=st.integers(0, 2**32 - 1), angle=st.floats(0.8, 2.3))
 def test_random_walks_are_certified(seed, angle, random_shape, random_solver, random_walk):
     generator = np.random.default_rng(seed)
     lines = ("backbone", "holes") if generator.random() < 0.5 else ("backbone", "rim")
     robot = replace(SpatialRobot.prototype(angle=angle), touch=lines, rim_points=8, between=int(generator.integers(2)))
-    for equilibrium in random_walk(generator, random_solver(generator, robot, random_shape), 60)[::10]:
+    for equilibrium in random_walk(generator, random_solver(generator, robot, random_shape), 60)[::15]:
         assert equilibrium.status is not Status.FAILED
         stationarity, lengths, gaps, complementarity, sign = equilibrium.residuals()
         assert stationarity < 1e-8
