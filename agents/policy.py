@@ -6,9 +6,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ccr_gym.fleet import Truth
 from ccr_gym.observation import FORCE_SCALE_N
 from solver import Equilibrium
-from solver.sensitivity import CABLE, sensitivity
+from solver.sensitivity import CABLE, LENGTH, sensitivity
 from solver.spatial.sensitivity import CABLES, spatial_sensitivity
 
 Observation = dict[str, np.ndarray]
@@ -33,6 +34,8 @@ def search(observation: Observation, angle: float = math.pi / 2) -> np.ndarray:
         observation: What is seen.
         angle: From the first cable to the second [rad].
     """
+    if "length" in observation:
+        return np.array([1.0, 0.0], np.float32)
     if "obstacle" not in observation:
         return np.ones(1, np.float32)
     azimuth = math.atan2(observation["obstacle"][1], observation["obstacle"][0])
@@ -75,10 +78,11 @@ class ForceController:
 
 @dataclass(slots=True)
 class NewtonController:
-    """Newton steps on the exact slopes of the contact force in the cables, at the equilibrium itself.
+    """Newton steps on the exact slopes of the contact force in what the actions move, at the equilibrium itself.
 
-    It knows the model, the scene and the state of the robot, which no policy sees. In space the smallest increment of
-    both cables is taken that meets the set-point, or comes closest to one that is a vector.
+    It knows the model, the scene, the state of the robot, its rigidity, the play of its motors and the next set-point,
+    which no policy sees: a bound for those that do not. Where there are two actions the smallest increments are taken
+    that meet the set-point, or come closest to one that is a vector.
 
     Attributes:
         damping: Slope of the force below which it is not trusted [N/mm].
@@ -94,23 +98,31 @@ class NewtonController:
 
     def act(self, observation: Observation) -> np.ndarray:
         """Pull until something touches, then step to where the force is that of the set-point."""
-        equilibrium = self._env.get_wrapper_attr("equilibrium")
-        if not equilibrium.contact.any():
+        truth: Truth = self._env.get_wrapper_attr("truth")
+        task, settings = self._env.get_wrapper_attr("task"), self._env.get_wrapper_attr("settings")
+        if not truth.force.any():
             return search(observation)
+        slopes = truth.stiffness * self._slopes(task.target, "length" in observation)
+        if np.ndim(truth.goal) == 0:  # along the force as it is
+            size = float(np.linalg.norm(truth.force))
+            slopes, lacking = slopes @ (truth.force / size)[:, None], np.array([truth.goal - size])
+        else:
+            lacking = truth.goal - truth.force
+        damped = slopes @ slopes.T + (truth.stiffness * self.damping) ** 2 * np.eye(len(slopes))
+        increments = np.linalg.solve(damped, slopes @ lacking)
+        play = np.where(increments == 0, 0.0, truth.places + np.copysign(truth.slack, increments) - truth.motors)
+        effort = (increments + play) / task.body.increments(settings)
+        return np.asarray(effort / max(1.0, np.abs(effort).max()), np.float32)
+
+    def _slopes(self, target: int | None, insertion: bool) -> np.ndarray:
+        """Slopes of the force that counts in what the actions move, ``(actions, d)`` [N/mm]."""
+        equilibrium = self._env.get_wrapper_attr("equilibrium")
+        counted = slice(None) if target is None else slice(target, target + 1)
         if isinstance(equilibrium, Equilibrium):
-            slopes = sensitivity(equilibrium).forces[CABLE : CABLE + 1].sum(axis=1)
+            slopes = sensitivity(equilibrium).forces[[CABLE, LENGTH] if insertion else [CABLE]]
         else:
-            slopes = spatial_sensitivity(equilibrium).forces[CABLES].sum(axis=1)
-        force = equilibrium.forces.sum(axis=0)
-        goal = FORCE_SCALE_N * observation["desired_force"].astype(float)
-        if goal.size == 1:  # along the force as it is
-            direction = force / np.linalg.norm(force)
-            slopes, lacking = slopes @ direction[:, None], goal - np.linalg.norm(force)
-        else:
-            lacking = goal - force
-        damped = slopes @ slopes.T + self.damping**2 * np.eye(len(slopes))
-        increment = np.linalg.solve(damped, slopes @ lacking) / self._env.get_wrapper_attr("settings").max_increment_mm
-        return np.asarray(increment / max(1.0, np.abs(increment).max()), np.float32)
+            slopes = spatial_sensitivity(equilibrium).forces[CABLES]
+        return np.asarray(slopes[:, counted].sum(axis=1))
 
 
 def _lacking(observation: Observation) -> float:

@@ -3,21 +3,37 @@
 from ccr_gym.env import ContactEnv
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
-from ccr_gym.settings import Settings, SpatialSettings
-from ccr_gym.tasks import LoadCell, PushObstacle, SpatialPush, Task
+from ccr_gym.sensing import Sensing
+from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
+from ccr_gym.tasks import (
+    BracedPush,
+    InsertAndPush,
+    LoadCell,
+    PushObstacle,
+    SoftObstacle,
+    SpatialPush,
+    Task,
+    TrackForce,
+)
 from ccr_gym.vector_env import ContactVectorEnv
 
 __all__ = [
     "ENV_IDS",
+    "BracedPush",
     "ContactEnv",
     "ContactVectorEnv",
+    "InsertAndPush",
+    "InsertionSettings",
     "LoadCell",
     "PushObstacle",
     "RewardWeights",
+    "Sensing",
     "Settings",
+    "SoftObstacle",
     "SpatialPush",
     "SpatialSettings",
     "Task",
+    "TrackForce",
 ]
 __version__ = "0.1.0"
 

@@ -12,10 +12,11 @@ from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
 from solver import Robot, Scene
 from solver.batch import BaseBatch, BatchSolver, ReferenceBatch
 from solver.forces import virtual_work
-from solver.layout import CABLE, LENGTH, PLANE, SPACE, TENSION, Layout, Model
+from solver.layout import CABLE, LENGTH, PLANE, SPACE, TENSION, Layout, Model, layout
 from solver.operations import ARRAYS, NUMBERS, Operations
 from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialRobot
 from solver.spatial import forces as spatial_forces
+from solver.spatial.equilibrium import spatial_layout
 
 Which = int | slice | list[int]
 Seen = dict[str, tuple[np.ndarray, np.ndarray | float]]
@@ -42,6 +43,10 @@ class Body(ABC):
     @abstractmethod
     def batch(self, settings: Any, count: int, obstacles: int, threads: int) -> BaseBatch:
         """The solver."""
+
+    def layout(self, robot: Any, obstacles: int) -> Layout:
+        """Where the numbers of an equilibrium stand."""
+        return layout(robot, obstacles)
 
     def operations(self, which: Which) -> Operations:
         """The arithmetic of what is one number for a robot: plain for one of them, arrays for many."""
@@ -91,9 +96,10 @@ class Body(ABC):
 class Plane(Body):
     """One cable in the plane."""
 
-    model, settings, actions, place = PLANE, Settings, 1, CABLE
+    model, settings, actions = PLANE, Settings, 1
+    place: ClassVar[int | slice] = CABLE
 
-    def batch(self, settings: Settings, count: int, obstacles: int, threads: int) -> BaseBatch:
+    def batch(self, settings: Any, count: int, obstacles: int, threads: int) -> BaseBatch:
         """The solver."""
         solver = ReferenceBatch if settings.backend == "casadi" else BatchSolver
         return solver(settings.robot, count, obstacles, threads)
@@ -104,11 +110,11 @@ class Plane(Body):
             return min(max(float(actions[0]), -1.0), 1.0)
         return np.minimum(np.maximum(actions[:, 0].astype(float), -1.0), 1.0)
 
-    def bounds(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         """Of the cable."""
         return np.zeros(1), np.array([settings.cable_limit_mm])
 
-    def command(self, blocks: np.ndarray, effort: Any, which: Which, settings: Settings) -> Any:
+    def command(self, blocks: np.ndarray, effort: Any, which: Which, settings: Any) -> Any:
         """A displacement from 0 to the limit."""
         minimum, maximum, _ = self.operations(which)
         command = blocks[which, CABLE] + effort * settings.max_increment_mm
@@ -152,18 +158,19 @@ class Plane(Body):
 class Insertion(Plane):
     """One cable in the plane, and a base that inserts the robot."""
 
-    settings, actions, place = InsertionSettings, 2, slice(CABLE, LENGTH + 1)
+    settings, actions = InsertionSettings, 2
+    place: ClassVar[int | slice] = slice(CABLE, LENGTH + 1)
 
-    def batch(self, settings: InsertionSettings, count: int, obstacles: int, threads: int) -> BaseBatch:
+    def batch(self, settings: Any, count: int, obstacles: int, threads: int) -> BaseBatch:
         """The solver."""
         return BatchSolver(settings.robot, count, obstacles, threads)
 
-    def bounds(self, settings: InsertionSettings) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         """Of the cable, and of the length."""
         shortest, longest = settings.robot.lengths_mm
         return np.array([0.0, shortest]), np.array([settings.cable_limit_mm, longest])
 
-    def increments(self, settings: InsertionSettings) -> np.ndarray:
+    def increments(self, settings: Any) -> np.ndarray:
         """Of the cable, and of the insertion."""
         return np.array([settings.max_increment_mm, settings.max_insertion_mm])
 
@@ -181,14 +188,19 @@ class Insertion(Plane):
 class Space(Body):
     """Two pairs of cables in space."""
 
-    model, settings, actions, place = SPACE, SpatialSettings, 2, slice(0, 2)
+    model, settings, actions = SPACE, SpatialSettings, 2
+    place: ClassVar[int | slice] = slice(0, 2)
     obstacle_size = 7
 
-    def batch(self, settings: SpatialSettings, count: int, obstacles: int, threads: int) -> BaseBatch:
+    def batch(self, settings: Any, count: int, obstacles: int, threads: int) -> BaseBatch:
         """The solver."""
         return SpatialBatchSolver(settings.robot, count, obstacles, threads)
 
-    def bounds(self, settings: SpatialSettings) -> tuple[np.ndarray, np.ndarray]:
+    def layout(self, robot: SpatialRobot, obstacles: int) -> Layout:
+        """That of a robot in space."""
+        return spatial_layout(robot, obstacles)
+
+    def bounds(self, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         """Of both displacements, either way."""
         limit = np.full(2, settings.cable_limit_mm)
         return -limit, limit

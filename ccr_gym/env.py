@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from ccr_gym.checks import require
-from ccr_gym.fleet import Fleet, Reading
+from ccr_gym.fleet import Fleet, Reading, Truth
 from ccr_gym.observation import FORCE_SCALE_N
 from ccr_gym.rendering import Frame, Renderer, draw_plane
 from ccr_gym.reward import TERMS
@@ -113,6 +113,11 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
     def equilibrium(self) -> Any:
         """The present equilibrium; immutable."""
         return self._fleet.equilibrium(0)
+
+    @property
+    def truth(self) -> Truth:
+        """What no agent sees."""
+        return self._fleet.truth(0)
 
     def _observation(self, reading: Reading) -> Observation:
         row = self._fleet.observe(reading, 0)

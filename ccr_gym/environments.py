@@ -1,226 +1,211 @@
 """The registered environments."""
 
-from typing import Any, TypeVar
+from typing import Any, ClassVar
 
+from ccr_gym.describe import describe
 from ccr_gym.env import ContactEnv
-from ccr_gym.tasks import LoadCell, PushObstacle, SpatialPush
+from ccr_gym.tasks import (
+    BracedPush,
+    InsertAndPush,
+    LoadCell,
+    PushObstacle,
+    SoftObstacle,
+    SpatialPush,
+    Task,
+    TrackForce,
+)
 from ccr_gym.vector_env import ContactVectorEnv
 
-TaskType = TypeVar("TaskType")
+FOUND = (
+    "drawn again until the straight robot is clear of it and a steady pull reaches the set-point without a stall, "
+    "jam or "
+    "snap."
+)
+CIRCLE = (
+    "The straight robot, cable slack. The obstacle's centre is uniform in 35–75 × 75–150 mm, its radius in 10–16 "
+    "mm, the "
+    "set-point in 20–150 mN, "
+)
 
 
-class LoadCellEnv(ContactEnv):
-    """Hold a set-point force on the paper's load cell (Fig. 8–10).
+class TaskEnv(ContactEnv):
+    """An environment of one kind of task."""
 
-    ## Description
-    A flat load cell stands at a random distance from a planar cable-driven continuum robot. Pulling the cable bends
-    the robot towards it until node 14, the paper's 15th, meets it (eq. 12); pulling on raises the contact force. The
-    agent commands cable increments and is to hold a desired force.
+    kind: ClassVar[type[Task]]
 
-    ## Action Space
-    `Box(-1, 1, (1,), float32)`: cable increment as a fraction of `max_increment_mm`; positive pulls. The cable moves
-    as far as its tension limit and the obstacles allow, within 0 to `cable_limit_mm`.
-
-    ## Observation Space
-    With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their concatenation in this order. Indices
-    are of the flat form for the default robot of n = 18 segments; everything is clipped to its bounds.
-
-    | Index | Key | Meaning | Scale | Bounds |
-    | --- | --- | --- | --- | --- |
-    | 0 | `cable` | cable displacement | `cable_limit_mm` (14 mm) | [0, 1] |
-    | 1–19 | `contact` | multiplier > 0 at the backbone point of nodes 0…n | flag | {0, 1} |
-    | 20–38 | `contact` | multiplier > 0 at the cable point of nodes 0…n | flag | {0, 1} |
-    | 39 | `desired_force` | set-point | 0.5 N | [0, 1] |
-    | 40 | `force_error` | set-point minus measured magnitude | 0.5 N | [-1, 1] |
-    | 41–42 | `force_est` | virtual-work estimate of the force on the robot, x and y (eq. 11) | 0.5 N | [-1, 1] |
-    | 43–44 | `force_measured` | force on the robot from an ideal force sensor, x and y | 0.5 N | [-1, 1] |
-    | 45–101 | `nodes` | x, y, disk angle of nodes 0…n, node by node | 180 mm, 180 mm, π rad | [-1, 1] |
-
-    Without `force_sensor` the keys `force_error` and `force_measured` are absent.
-
-    ## Rewards
-    The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the set-point:
-    `force_error` −min(|F−F_d|/F_d, 1); `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), 1) / 2;
-    `approach` minus the clearance in units of 100 mm while nothing touches; `effort` −0.02 a².
-
-    ## Starting State
-    The straight robot, cable slack. The distance is uniform in 24–51 mm and the set-point in 10–60 mN, drawn again
-    until a steady pull reaches the set-point.
-
-    ## Episode End
-    No state is terminal. Episodes are truncated after 64 steps.
-
-    ## Info
-    `force_true` and `force_est` (force on the robot, (2,) [N]), `desired_force` [N], `cable_mm`, `tension` [N],
-    `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success` (within 5 % of
-    the set-point), `reward_terms`.
-
-    ## Arguments
-    `render_mode`, the fields of `ccr_gym.settings.Settings`, and `task`: `LoadCell` or a mapping of its fields;
-    mappings make every argument JSON-able.
-
-    ## Version History
-    * v0: initial version.
-    """
-
-    def __init__(self, task: LoadCell | dict[str, Any] | None = None, **kwargs: Any) -> None:
+    def __init__(self, task: Task | dict[str, Any] | None = None, **kwargs: Any) -> None:
         """See the class; `kwargs` are those of `ContactEnv`."""
-        super().__init__(_of(LoadCell, task), **kwargs)
+        super().__init__(_of(self.kind, task), **kwargs)
 
 
-class LoadCellVectorEnv(ContactVectorEnv):
+class TaskVectorEnv(ContactVectorEnv):
+    """Many environments of one kind of task."""
+
+    kind: ClassVar[type[Task]]
+
+    def __init__(self, task: Task | dict[str, Any] | None = None, **kwargs: Any) -> None:
+        """See the single environment; `kwargs` are those of `ContactVectorEnv`."""
+        super().__init__(_of(self.kind, task), **kwargs)
+
+
+class LoadCellEnv(TaskEnv):  # noqa: D101 - below
+    kind = LoadCell
+    __doc__ = describe(
+        LoadCell(),
+        "Hold a set-point force on the paper's load cell (Fig. 8–10).",
+        "A flat load cell stands at a random distance from a planar cable-driven continuum robot. Pulling the "
+        "cable bends "
+        "the robot towards it until node 14, the paper's 15th, meets it (eq. 12); pulling on raises the contact "
+        "force. The "
+        "agent commands cable increments and is to hold a desired force.",
+        "The straight robot, cable slack. The distance is uniform in 24–51 mm and the set-point in 10–60 mN, drawn "
+        "again "
+        "until a steady pull reaches the set-point.",
+    )
+
+
+class PushObstacleEnv(TaskEnv):  # noqa: D101 - below
+    kind = PushObstacle
+    __doc__ = describe(
+        PushObstacle(),
+        "Find a circular obstacle and push it with a desired force.",
+        "A circular obstacle of random position and size lies somewhere in front of a planar cable-driven "
+        "continuum robot. "
+        "Pulling the cable bends the robot towards it; where and when it touches, and how the force then grows "
+        "with the "
+        "cable, depends on the scene. The agent commands cable increments and is to hold a desired contact force.",
+        CIRCLE + FOUND,
+    )
+
+
+class TrackForceEnv(TaskEnv):  # noqa: D101 - below
+    kind = TrackForce
+    __doc__ = describe(
+        TrackForce(),
+        "Push a circular obstacle with a force that steps and swings.",
+        "As `PushObstacle`, but the set-point moves: it swings about a level that changes three times in an "
+        "episode. It is "
+        "seen some steps ahead, so that an agent that knows its robot can follow without delay.",
+        CIRCLE
+        + "which is the highest of the episode; its levels are 30–100 % of that before they are scaled to it, the "
+        "swing 10–40 % of the level with a period of 24–64 steps; " + FOUND,
+    )
+
+
+class BracedPushEnv(TaskEnv):  # noqa: D101 - below
+    kind = BracedPush
+    __doc__ = describe(
+        BracedPush(),
+        "Brace on one obstacle and push another with a desired force.",
+        "Two circular obstacles as in the paper's Fig. 4b. The robot meets the lower one, leans on it, and reaches "
+        "the upper "
+        "one beyond, whose contact force is to be held; what the lower one carries changes with it. Slips are "
+        "within reach.",
+        "The straight robot, cable slack. Centre and radius of the lower obstacle are uniform in 27–38 × 75–95 mm "
+        "and 10–14 "
+        "mm, those of the upper one in 52–72 × 125–150 mm and 12–16 mm, the set-point in 20–120 mN, " + FOUND,
+    )
+
+
+class SoftObstacleEnv(TaskEnv):  # noqa: D101 - below
+    kind = SoftObstacle
+    __doc__ = describe(
+        SoftObstacle(),
+        "Push an obstacle on a spring of unknown stiffness with a desired force.",
+        "As `PushObstacle`, but the obstacle is mounted on a spring and gives way. The stiffness varies more than "
+        "tenfold "
+        "from episode to episode, and so does how much force a millimetre of cable is worth.",
+        CIRCLE + "the stiffness in 0.003–0.1 N/mm, evenly in its logarithm; " + FOUND,
+    )
+
+
+class InsertAndPushEnv(TaskEnv):  # noqa: D101 - below
+    kind = InsertAndPush
+    __doc__ = describe(
+        InsertAndPush(),
+        "Push an obstacle with the cable and the insertion of the base.",
+        "A circular obstacle in front of a planar robot whose cable slides through its disks, and whose base can "
+        "insert it "
+        "by 20 mm either way. Both actions change the contact force.",
+        "The straight robot, 160 mm long, cable slack. The obstacle's centre is uniform in 35–75 × 75–130 mm, its "
+        "radius in "
+        "10–16 mm, the set-point in 20–150 mN, " + FOUND,
+        action="increments of cable and length as fractions of `max_increment_mm` and `max_insertion_mm`; positive "
+        "pulls and inserts",
+    )
+
+
+class SpatialPushEnv(TaskEnv):  # noqa: D101 - below
+    kind = SpatialPush
+    __doc__ = describe(
+        SpatialPush(),
+        "Push a sphere or a cylinder in space with a desired force.",
+        "A sphere or a cylinder of random position and size stands anywhere around a cable-driven continuum robot "
+        "with two "
+        "pairs of opposite cables (eq. 13). Pulling them bends the robot towards any side. The agent commands both "
+        "increments and is to hold a desired contact force. Pressed in its middle, a sphere lets the robot slip to "
+        "either "
+        'side once the force is high enough. With `task={"force_vector": True}` magnitude and direction are asked '
+        "for: "
+        "`desired_force` and `force_error` are vectors of three numbers in [-1, 1], and the indices after them "
+        "grow by two "
+        "or four.",
+        "The straight robot, cables slack. The obstacle stands at a uniform azimuth, its centre 35–65 mm off the "
+        "axis and "
+        "80–150 mm high, its radius uniform in 10–16 mm; half of them are cylinders of 60 mm across the way of the "
+        "robot, "
+        "tilted by up to 30°. The set-point is uniform in 20–150 mN, drawn again until a steady pull towards the "
+        "obstacle "
+        "reaches it without a stall, jam or snap. With `force_vector` that pull is up to 0.25 rad aside of the "
+        "obstacle, and "
+        "the force it gets to is the set-point.",
+        action="increments of both signed displacements as fractions of `max_increment_mm`; a positive displacement "
+        "pulls the first cable of a pair, a negative one the opposite cable",
+    )
+
+
+class LoadCellVectorEnv(TaskVectorEnv):
     """Many `LoadCellEnv`, moved by one call of the solver."""
 
-    def __init__(self, task: LoadCell | dict[str, Any] | None = None, **kwargs: Any) -> None:
-        """See `LoadCellEnv`; `kwargs` are those of `ContactVectorEnv`."""
-        super().__init__(_of(LoadCell, task), **kwargs)
+    kind = LoadCell
 
 
-class PushObstacleEnv(ContactEnv):
-    """Find a circular obstacle and push it with a desired force.
-
-    ## Description
-    A circular obstacle of random position and size lies somewhere in front of a planar cable-driven continuum robot.
-    Pulling the cable bends the robot towards it; where and when it touches, and how the force then grows with the
-    cable, depends on the scene. The agent commands cable increments and is to hold a desired contact force.
-
-    ## Action Space
-    `Box(-1, 1, (1,), float32)`: cable increment as a fraction of `max_increment_mm`; positive pulls. The cable moves
-    as far as its tension limit and the obstacles allow, within 0 to `cable_limit_mm`.
-
-    ## Observation Space
-    With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their concatenation in this order. Indices
-    are of the flat form for the default robot of n = 18 segments; everything is clipped to its bounds.
-
-    | Index | Key | Meaning | Scale | Bounds |
-    | --- | --- | --- | --- | --- |
-    | 0 | `cable` | cable displacement | `cable_limit_mm` (14 mm) | [0, 1] |
-    | 1–19 | `contact` | multiplier > 0 at the backbone point of nodes 0…n | flag | {0, 1} |
-    | 20–38 | `contact` | multiplier > 0 at the cable point of nodes 0…n | flag | {0, 1} |
-    | 39 | `desired_force` | set-point | 0.5 N | [0, 1] |
-    | 40 | `force_error` | set-point minus measured magnitude | 0.5 N | [-1, 1] |
-    | 41–42 | `force_est` | virtual-work estimate of the force on the robot, x and y (eq. 11) | 0.5 N | [-1, 1] |
-    | 43–44 | `force_measured` | force on the robot from an ideal force sensor, x and y | 0.5 N | [-1, 1] |
-    | 45–101 | `nodes` | x, y, disk angle of nodes 0…n, node by node | 180 mm, 180 mm, π rad | [-1, 1] |
-
-    Without `force_sensor` the keys `force_error` and `force_measured` are absent.
-
-    ## Rewards
-    The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the set-point:
-    `force_error` −min(|F−F_d|/F_d, 1); `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), 1) / 2;
-    `approach` minus the clearance in units of 100 mm while nothing touches; `effort` −0.02 a².
-
-    ## Starting State
-    The straight robot, cable slack. The obstacle's centre is uniform in 35–75 × 75–150 mm, its radius in 10–16 mm, the
-    set-point in 20–150 mN, drawn again until the straight robot is clear of the obstacle and a steady pull reaches the
-    set-point without a stall, jam or snap.
-
-    ## Episode End
-    No state is terminal. Episodes are truncated after 64 steps.
-
-    ## Info
-    `force_true` and `force_est` (force on the robot, (2,) [N]), `desired_force` [N], `cable_mm`, `tension` [N],
-    `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success` (within 5 % of
-    the set-point), `reward_terms`.
-
-    ## Arguments
-    `render_mode`, the fields of `ccr_gym.settings.Settings`, and `task`: `PushObstacle` or a mapping of its fields;
-    mappings make every argument JSON-able.
-
-    ## Version History
-    * v0: initial version.
-    """
-
-    def __init__(self, task: PushObstacle | dict[str, Any] | None = None, **kwargs: Any) -> None:
-        """See the class; `kwargs` are those of `ContactEnv`."""
-        super().__init__(_of(PushObstacle, task), **kwargs)
-
-
-class PushObstacleVectorEnv(ContactVectorEnv):
+class PushObstacleVectorEnv(TaskVectorEnv):
     """Many `PushObstacleEnv`, moved by one call of the solver."""
 
-    def __init__(self, task: PushObstacle | dict[str, Any] | None = None, **kwargs: Any) -> None:
-        """See `PushObstacleEnv`; `kwargs` are those of `ContactVectorEnv`."""
-        super().__init__(_of(PushObstacle, task), **kwargs)
+    kind = PushObstacle
 
 
-class SpatialPushEnv(ContactEnv):
-    """Push a sphere or a cylinder in space with a desired force.
+class TrackForceVectorEnv(TaskVectorEnv):
+    """Many `TrackForceEnv`, moved by one call of the solver."""
 
-    ## Description
-    A sphere or a cylinder of random position and size stands anywhere around a cable-driven continuum robot with two
-    pairs of opposite cables (eq. 13). Pulling them bends the robot towards any side. The agent commands both increments
-    and is to hold a desired contact force. Pressed in its middle, a sphere lets the robot slip to either side once the
-    force is high enough, which two cables can prevent and one cannot.
-
-    ## Action Space
-    `Box(-1, 1, (2,), float32)`: increments of both signed displacements as fractions of `max_increment_mm`. A positive
-    displacement pulls the first cable of a pair, a negative one the opposite cable. The cables move as far as their
-    tension limit and the obstacles allow, within ±`cable_limit_mm`.
-
-    ## Observation Space
-    With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their concatenation in this order. Indices
-    are of the flat form for the default robot of n = 18 segments; everything is clipped to its bounds.
-
-    | Index | Key | Meaning | Scale | Bounds |
-    | --- | --- | --- | --- | --- |
-    | 0–1 | `cable` | signed displacements | `cable_limit_mm` (10 mm) | [-1, 1] |
-    | 2–20 | `contact` | multiplier > 0 at the backbone point of nodes 0…n | flag | {0, 1} |
-    | 21–96 | `contact` | multiplier > 0 at the holes of nodes 0…n: first, second cable, opposites | flag | {0, 1} |
-    | 97 | `desired_force` | set-point | 0.5 N | [0, 1] |
-    | 98 | `force_error` | set-point minus measured magnitude | 0.5 N | [-1, 1] |
-    | 99–101 | `force_est` | virtual-work estimate of the force on the robot, x, y, z | 0.5 N | [-1, 1] |
-    | 102–104 | `force_measured` | force on the robot from an ideal force sensor, x, y, z | 0.5 N | [-1, 1] |
-    | 105–218 | `frames` | first and last axis of the disk of nodes 0…n, node by node | 1 | [-1, 1] |
-    | 219–275 | `nodes` | x, y, z of nodes 0…n, node by node | 180 mm | [-1, 1] |
-    | 276–282 | `obstacle` | centre x, y, z; axis of a cylinder, else 0; radius | 180 mm, 1, 20 mm | [-1, 1] |
-
-    Without `force_sensor` the keys `force_error` and `force_measured` are absent. With `task={"force_vector": True}`
-    `desired_force` and `force_error` are vectors of three numbers in [-1, 1], and all indices after them grow by two or
-    four.
-
-    ## Rewards
-    The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the set-point, both
-    magnitudes, or vectors with `force_vector` where their difference is taken: `force_error` −min(|F−F_d|/F_d, 1);
-    `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), 1) / 2; `approach` minus the clearance in
-    units of 100 mm while nothing touches; `effort` −0.02 times the mean square of the action.
-
-    ## Starting State
-    The straight robot, cables slack. The obstacle stands at a uniform azimuth, its centre 35–65 mm off the axis and
-    80–150 mm high, its radius uniform in 10–16 mm; half of them are cylinders of 60 mm across the way of the robot,
-    tilted by up to 30°. The set-point is uniform in 20–150 mN, drawn again until a steady pull towards the obstacle
-    reaches it without a stall, jam or snap. With `force_vector` that pull is up to 0.25 rad aside of the obstacle, and
-    the force it gets to is the set-point.
-
-    ## Episode End
-    No state is terminal. Episodes are truncated after 64 steps.
-
-    ## Info
-    `force_true` and `force_est` (force on the robot, (3,) [N]), `desired_force` [N], `cable_mm` and `tension` ((2,)
-    [mm], [N]), `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success`
-    (within 5 % of the set-point), `reward_terms`.
-
-    ## Arguments
-    `render_mode`, the fields of `ccr_gym.settings.SpatialSettings`, and `task`: `SpatialPush` or a mapping of its
-    fields; mappings make every argument JSON-able.
-
-    ## Version History
-    * v0: initial version.
-    """
-
-    def __init__(self, task: SpatialPush | dict[str, Any] | None = None, **kwargs: Any) -> None:
-        """See the class; `kwargs` are those of `ContactEnv`."""
-        super().__init__(_of(SpatialPush, task), **kwargs)
+    kind = TrackForce
 
 
-class SpatialPushVectorEnv(ContactVectorEnv):
+class BracedPushVectorEnv(TaskVectorEnv):
+    """Many `BracedPushEnv`, moved by one call of the solver."""
+
+    kind = BracedPush
+
+
+class SoftObstacleVectorEnv(TaskVectorEnv):
+    """Many `SoftObstacleEnv`, moved by one call of the solver."""
+
+    kind = SoftObstacle
+
+
+class InsertAndPushVectorEnv(TaskVectorEnv):
+    """Many `InsertAndPushEnv`, moved by one call of the solver."""
+
+    kind = InsertAndPush
+
+
+class SpatialPushVectorEnv(TaskVectorEnv):
     """Many `SpatialPushEnv`, moved by one call of the solver."""
 
-    def __init__(self, task: SpatialPush | dict[str, Any] | None = None, **kwargs: Any) -> None:
-        """See `SpatialPushEnv`; `kwargs` are those of `ContactVectorEnv`."""
-        super().__init__(_of(SpatialPush, task), **kwargs)
+    kind = SpatialPush
 
 
-def _of(kind: type[TaskType], task: Any) -> TaskType:
+def _of(kind: type[Task], task: Task | dict[str, Any] | None) -> Task:
     """A task, from one, a mapping of its fields, or nothing."""
     return kind(**task) if isinstance(task, dict) else task or kind()

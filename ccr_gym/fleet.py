@@ -44,6 +44,26 @@ class Reading(NamedTuple):
     error: Any
 
 
+class Truth(NamedTuple):
+    """What no agent sees of a robot, for controllers that are to bound what agents can do.
+
+    Attributes:
+        force: Contact force on the robot that counts, ``(d,)`` [N].
+        stiffness: Rigidity over the one that is known.
+        goal: Set-point after the next step, a magnitude or ``(d,)`` [N].
+        places: Where the motors have left what they move, ``(actions,)`` [mm].
+        motors: Where the motors are, ``(actions,)`` [mm].
+        slack: Half of their play, ``(actions,)`` [mm].
+    """
+
+    force: np.ndarray
+    stiffness: float
+    goal: Any
+    places: np.ndarray
+    motors: np.ndarray
+    slack: np.ndarray
+
+
 class Fleet:
     """Robots, each with a scene and a force to push with.
 
@@ -198,6 +218,15 @@ class Fleet:
             "is_success": reading.error <= 0.05,
             "reward_terms": dict(zip(TERMS, terms, strict=True)),
         }
+
+    def truth(self, robot: int) -> Truth:
+        """What is hidden of a robot."""
+        senses, force = self._senses, self.read(robot).force_true
+        goal = self._goals[robot].copy() if self._task.force_vector else self._desired(1, robot)
+        places = np.atleast_1d(self.solver.blocks[robot, self.body.place]).copy()
+        if senses is None:
+            return Truth(force, 1.0, goal, places, places, np.zeros(places.size))
+        return Truth(force, float(senses.stiffness[robot]), goal, places, senses.motors(robot), senses.slack(robot))
 
     def equilibrium(self, robot: int) -> Any:
         """A robot's present equilibrium; immutable."""

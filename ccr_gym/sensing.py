@@ -29,7 +29,7 @@ class Sensing:
         noise_n: Standard deviation of white noise on each component of the measured force [N].
         bias_n: Constant error of each component, in size [N].
         backlash_mm: Play between motor and cable: a reversal moves nothing until it is taken up [mm].
-        friction: Share of the cable load that friction takes before it is measured, of which the estimate knows nothing.
+        friction: Share of the cable load that friction takes before it is measured, unknown to the estimate.
         stiffness: Rigidity of the robot over the one that is known; forces grow with it, shapes do not change.
 
     Raises:
@@ -109,20 +109,24 @@ class Senses:
         motors = self._motors[which]
         motors = np.minimum(np.maximum(motors + np.reshape(increments, motors.shape), low), high)
         self._motors[which] = motors
-        slack = np.asarray(self._play[which])[..., None] / 2 * self._geared
+        slack = self.slack(which)
         moved = np.minimum(np.maximum(np.reshape(places, motors.shape), motors - slack), motors + slack)
         return np.reshape(np.minimum(np.maximum(moved, low), high), np.shape(places))
 
     def motors(self, which: Any) -> np.ndarray:
         """Places of the motors, which is what their encoders tell, ``(..., actions)`` [mm]."""
-        return self._motors[which]
+        return np.asarray(self._motors[which])
+
+    def slack(self, which: Any) -> np.ndarray:
+        """How far the motors can be from what they move, ``(..., actions)`` [mm]."""
+        return np.asarray(np.asarray(self._play[which])[..., None] / 2 * self._geared)
 
     def noise(self, time: np.ndarray, which: Any) -> np.ndarray:
         """Error of the measured force at a step, ``(..., d)`` [N]."""
         return np.asarray(self._noise[np.arange(len(time))[which], time[which] % NOISE_STEPS])
 
     def late(self, rows: np.ndarray, time: np.ndarray, which: Any) -> np.ndarray:
-        """What is seen at a step where some of it comes late, ``(..., columns)``; before the first, that of the first."""
+        """What is seen at a step where some of it comes late, ``(..., columns)``; at first, what was at first."""
         robots = np.atleast_1d(np.arange(len(time))[which])
         now, new, fresh = time[robots], rows.reshape(len(robots), -1), self._fresh[robots]
         self._rows[robots[fresh]] = new[fresh, None]

@@ -24,8 +24,8 @@ class Settings:
         force_limit: Contact force above which ``info["cost"]`` counts [N].
         weights: Weights of the reward terms; a mapping of names to numbers is taken as well.
         backend: ``"native"``, or ``"casadi"`` for the reference solver (slow).
-        sensing: ``"ideal"``, ``"realistic"``, or the ranges of what is not ideal, as :class:`ccr_gym.sensing.Sensing` or a
-            mapping of its fields.
+        sensing: ``"ideal"``, ``"realistic"``, or the ranges of what is not ideal, as
+            :class:`ccr_gym.sensing.Sensing` or a mapping of its fields.
         split: Which scenes are drawn: ``"train"``, ``"test"``, which no training scene is in, or ``"all"``.
 
     Raises:

@@ -46,13 +46,19 @@ class Task(ABC):
         target: The obstacle whose contact force is asked for; ``None`` for all together.
         force_vector: Whether the set-point is a vector: the force that the trial pull gets to.
         moving: Whether the set-point moves, and is seen ahead.
+        steps: Steps of an episode.
     """
 
     body: ClassVar[Body] = IN_PLANE
     obstacles: ClassVar[int] = 1
     target: ClassVar[int | None] = None
-    force_vector: ClassVar[bool] = False
     moving: ClassVar[bool] = False
+    steps: ClassVar[int] = 64
+
+    @property
+    def force_vector(self) -> bool:
+        """As above."""
+        return False
 
     @abstractmethod
     def draw(self, robot: Any, generator: np.random.Generator) -> Assignment:
@@ -108,14 +114,15 @@ class TrackForce(PushObstacle):
     """The same with a set-point that steps and swings, and is seen some steps ahead.
 
     Attributes:
-        steps: Largest number of steps of the set-point in an episode.
+        jumps: Number of jumps of the set-point in an episode.
         swing: Range of its swing's amplitude, over its level.
         period: Range of the swing's period [steps].
     """
 
     moving: ClassVar[bool] = True
+    steps: ClassVar[int] = COURSE_STEPS
 
-    steps: int = 3
+    jumps: int = 3
     swing: tuple[float, float] = (0.1, 0.4)
     period: tuple[float, float] = (24.0, 64.0)
 
@@ -123,8 +130,8 @@ class TrackForce(PushObstacle):
         """A scene, the highest force, and the way to it."""
         drawn = PushObstacle.draw(self, robot, generator)
         swing, period, phase, _ = uniform(generator, self.swing, self.period, (0.0, 2 * math.pi), (0.0, 1.0))
-        times = np.sort(generator.uniform(0, COURSE_STEPS, self.steps))
-        levels = generator.uniform(0.3, 1.0, self.steps + 1)
+        times = np.sort(generator.uniform(0, COURSE_STEPS, self.jumps))
+        levels = generator.uniform(0.3, 1.0, self.jumps + 1)
         now = np.arange(COURSE_STEPS)
         course = levels[np.searchsorted(times, now)] * (1 + swing * np.sin(2 * math.pi * now / period + phase))
         return drawn._replace(course=course / course.max())
@@ -206,7 +213,7 @@ class SpatialPush(Task):
     cylinders: float = 0.5
     tilt: float = math.pi / 6
     force_n: tuple[float, float] = (0.02, 0.15)
-    force_vector: bool = False  # type: ignore[misc] - a choice here
+    force_vector: bool = False
     aside: float = 0.25
 
     def draw(self, robot: SpatialRobot, generator: np.random.Generator) -> Assignment:
@@ -284,7 +291,7 @@ def assign(
 
 
 def in_test_split(scene: Scene) -> bool:
-    """Whether a scene is one of the test scenes: a fixed fifth of all there are, told by the numbers of their shapes."""
+    """Whether a scene is a test scene: a fixed fifth of all there are, told by the numbers of their shapes."""
     return zlib.crc32(np.array(scene.parameters).tobytes()) % TEST_SHARE == 0
 
 

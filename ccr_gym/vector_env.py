@@ -25,7 +25,7 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     Args:
         task: What an episode asks.
         num_envs: Number of environments.
-        max_episode_steps: Steps after which an episode is truncated.
+        max_episode_steps: Steps after which an episode is truncated; ``None`` for those of the task.
         autoreset_mode: What happens after the end of an episode: the next step resets (``"NextStep"``), the last step
             does (``"SameStep"``), or the caller (``"Disabled"``).
         threads: Threads of the solver; results do not depend on them.
@@ -39,11 +39,12 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self,
         task: Task,
         num_envs: int = 1,
-        max_episode_steps: int = 64,
+        max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
         **settings: Any,
     ) -> None:
+        max_episode_steps = task.steps if max_episode_steps is None else max_episode_steps
         require(max_episode_steps > 0, f"max_episode_steps is {max_episode_steps}; it must be positive")
         self.task, self.settings, self.num_envs = task, task.body.settings(**settings), num_envs
         self.max_episode_steps = max_episode_steps

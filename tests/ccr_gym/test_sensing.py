@@ -1,0 +1,128 @@
+"""What is not ideal: latency, noise, backlash, unknown friction and rigidity; and scenes that are kept for testing."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import ccr_gym
+from ccr_gym import Sensing
+from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym.tasks import in_test_split
+
+EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
+EXACT = {name: (0.0, 0.0) for name in ("noise_n", "bias_n", "backlash_mm", "friction")} | {"stiffness": (1.0, 1.0)}
+
+
+def make(env_id, **kwargs):
+    return gymnasium.make(env_id, disable_env_checker=True, **kwargs)
+
+
+def play(env, seed=3, steps=40):
+    """Observations and infos of steps drawn at random towards pulling."""
+    generator = np.random.default_rng(0)
+    record = [env.reset(seed=seed)]
+    for _ in range(steps):
+        observation, _, _, _, info = env.step(generator.uniform(-0.3, 1, env.action_space.shape).astype(np.float32))
+        record.append((observation, info))
+    return record
+
+
+@EVERY_ID
+def test_without_any_error_it_is_ideal(env_id):
+    ideal = play(make(env_id))
+    exact = play(make(env_id, sensing={**EXACT, "latency": [0, 0]}))
+    for (seen, info), (same, told) in zip(ideal, exact, strict=True):
+        assert seen.keys() == same.keys()
+        for key, value in seen.items():
+            assert same[key] == pytest.approx(value, abs=2e-6), key
+        assert told["force_true"] == pytest.approx(info["force_true"], abs=1e-9)
+
+
+@EVERY_ID
+def test_what_is_late_is_what_was(env_id):
+    ideal = play(make(env_id))
+    late = play(make(env_id, sensing={**EXACT, "latency": [2, 2]}))
+    for k, (seen, _) in enumerate(late):
+        for key in ("nodes", "contact", "force_measured", "force_est"):
+            assert seen[key] == pytest.approx(ideal[max(k - 2, 0)][0][key], abs=2e-6)
+        assert seen["desired_force"] == pytest.approx(ideal[k][0]["desired_force"])
+        assert seen["cable"] == pytest.approx(ideal[k][0]["cable"], abs=1e-6)
+
+
+@EVERY_ID
+def test_vector_and_single_environments_are_the_same(env_id):
+    kwargs = {"sensing": "realistic", "obs_mode": "flat"}
+    ours = gymnasium.make_vec(env_id, 3, vectorization_mode="vector_entry_point", max_episode_steps=9, **kwargs)
+    theirs = gymnasium.make_vec(env_id, 3, vectorization_mode="sync", max_episode_steps=9, **kwargs)
+    assert np.array_equal(ours.reset(seed=5)[0], theirs.reset(seed=5)[0])
+    generator = np.random.default_rng(1)
+    for _ in range(40):
+        actions = generator.uniform(-0.4, 1, ours.action_space.shape).astype(np.float32)
+        our, their = ours.step(actions), theirs.step(actions)
+        assert np.array_equal(our[0], their[0])
+        assert np.array_equal(our[1], their[1])
+        assert np.array_equal(our[4]["force_true"], their[4]["force_true"])
+
+
+def test_backlash_is_taken_up_before_anything_moves():
+    env = make("CCR/PushObstacle-v0", sensing={**EXACT, "latency": [0, 0], "backlash_mm": [0.4, 0.4]})
+    env.reset(seed=0)
+    moved = [env.step(np.full(1, action, np.float32))[4]["cable_mm"] for action in (1, 1, -0.4, -0.4, -0.4)]
+    assert moved == pytest.approx([0.3, 0.8, 0.8, 0.8, 0.6])
+    observation, *_ = env.step(np.zeros(1, np.float32))
+    assert 14 * observation["cable"][0] == pytest.approx(0.4)  # the motor tells where it is
+
+
+def test_forces_grow_with_the_rigidity_and_shapes_do_not_change():
+    soft, stiff = (
+        play(make("CCR/PushObstacle-v0", sensing={**EXACT, "latency": [0, 0], "stiffness": [s, s]})) for s in (0.5, 2.0)
+    )
+    touched = False
+    for (seen, info), (same, told) in zip(soft, stiff, strict=True):
+        assert np.array_equal(seen["nodes"], same["nodes"])
+        assert told["force_true"] == pytest.approx(4 * info["force_true"])
+        assert told["force_est"] == pytest.approx(4 * info["force_est"])
+        touched |= bool(info["force_true"].any())
+    assert touched
+
+
+def test_noise_and_bias_have_the_size_that_is_asked_for():
+    sensing = {**EXACT, "latency": [0, 0], "noise_n": [0.002, 0.002], "bias_n": [0.004, 0.004]}
+    env, errors = make("CCR/PushObstacle-v0", sensing=sensing), []
+    for seed in range(20):
+        record = play(env, seed, 25)
+        seen = np.array([o["force_measured"] * FORCE_SCALE_N for o, _ in record])
+        errors.append(seen - [info["force_true"] for _, info in record])
+    errors = np.array(errors)
+    assert np.abs(errors.mean(axis=1)) == pytest.approx(np.full((20, 2), 0.004), abs=0.001)
+    assert errors.std(axis=1).mean() == pytest.approx(0.002, rel=0.1)
+
+
+@EVERY_ID
+def test_training_and_test_scenes_have_none_in_common(env_id):
+    for split in ("train", "test"):
+        env = make(env_id, split=split)
+        for seed in range(12):
+            env.reset(seed=seed)
+            assert in_test_split(env.unwrapped.equilibrium.scene) == (split == "test")
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"sensing": "perfect"}, "sensing is 'perfect'"),
+        ({"sensing": {"latency": [1, 9]}}, "latency is"),
+        ({"sensing": {"latency": [0.5, 1.5]}}, "whole steps"),
+        ({"sensing": {"noise_n": [0.2, 0.1]}}, "noise_n is"),
+        ({"sensing": {"stiffness": [0.0, 1.0]}}, "stiffness is"),
+        ({"split": "validation"}, "split is"),
+    ],
+)
+def test_what_it_refuses(kwargs, message):
+    with pytest.raises(ValueError, match=message):
+        make("CCR/PushObstacle-v0", **kwargs)
+
+
+def test_the_ranges_are_kept():
+    assert make("CCR/PushObstacle-v0", sensing="realistic").unwrapped.settings.senses == Sensing()
+    assert make("CCR/PushObstacle-v0").unwrapped.settings.senses is None
