@@ -48,18 +48,23 @@ def evaluate(config: EvaluateConfig) -> None:
     except (FileNotFoundError, ValueError) as error:
         raise SystemExit(str(error)) from error
     env_id = learned.config.env_id
-    policies: tuple[Policy, ...] = (learned, ForceController(), NewtonController())
-    episodes = {p.name: run_episodes(p, env_id, config.seed, config.episodes) for p in policies}
+    policies: tuple[Policy, ...] = (learned, ForceController.tuned(env_id), NewtonController())
+    told = {"sensing": learned.config.sensing, "split": "test"}
+    episodes = {p.name: run_episodes(p, env_id, config.seed, config.episodes, **told) for p in policies}
     summaries = [summarize(name, played) for name, played in episodes.items()]
     policies_report = [summary.as_dict() for summary in summaries]
-    report = {"env_id": env_id, "episodes": config.episodes, "seed": config.seed, "policies": policies_report}
+    report = {"env_id": env_id, **told, "episodes": config.episodes, "seed": config.seed, "policies": policies_report}
     (config.run / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n")
     draw_evaluation(episodes, config.run / "evaluation.png")
     video = config.run / "evaluation.mp4"
     video.unlink(missing_ok=True)
     if config.video:
-        record(learned, env_id, config.seed, config.video_episodes, video)
-    show(summaries, f"{env_id}, {config.episodes} unseen episodes", sorted(config.run.glob("evaluation.*")))
+        record(learned, env_id, config.seed, config.video_episodes, video, **told)
+    show(
+        summaries,
+        f"{env_id}, {config.episodes} episodes of test scenes, {learned.config.sensing} sensing",
+        sorted(config.run.glob("evaluation.*")),
+    )
 
 
 def show(summaries: "list[Summary]", title: str, written: list[Path]) -> None:

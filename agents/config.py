@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 EVALUATION_SEED = 1_000_000  # training seeds stay below, evaluation seeds begin here
 
@@ -15,6 +16,8 @@ class TrainConfig:
     """Folder for policy, configuration, normaliser and TensorBoard log."""
     env_id: str = "CCR/PushObstacle-v0"
     """Environment to train on."""
+    sensing: Literal["ideal", "realistic"] = "ideal"
+    """What stands between robot and learner: nothing, or backlash, latency, noise and what is unknown."""
     seed: int = 0
     """Seed of the learner and of the first environment's scenes; below 1 000 000, where evaluation begins."""
     steps: int = 160_000
@@ -39,10 +42,14 @@ class TrainConfig:
     """Logarithm of the first exploration noise."""
     width: int = 64
     """Units in each of the two hidden layers."""
+    frames: int = 1
+    """Observations that are seen at once, the latest last."""
 
     def __post_init__(self) -> None:
         if self.steps < 1:
             raise ValueError(f"steps is {self.steps}; it must be at least 1")
+        if not 1 <= self.frames <= 64:
+            raise ValueError(f"frames is {self.frames}; it must be from 1 to 64")
         if not 0 <= self.seed <= EVALUATION_SEED - self.envs:
             raise ValueError(f"seed is {self.seed}; it must be from 0 to {EVALUATION_SEED - self.envs}")
 

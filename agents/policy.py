@@ -13,6 +13,15 @@ from solver.sensitivity import CABLE, LENGTH, sensitivity
 from solver.spatial.sensitivity import CABLES, spatial_sensitivity
 
 Observation = dict[str, np.ndarray]
+PI_GAINS = {  # proportional and integral, found by `python benchmarks/headroom.py`
+    "CCR/LoadCell-v0": (6.0, 16.0),
+    "CCR/PushObstacle-v0": (1.0, 16.0),
+    "CCR/TrackForce-v0": (10.0, 16.0),
+    "CCR/BracedPush-v0": (6.0, 16.0),
+    "CCR/SoftObstacle-v0": (10.0, 16.0),
+    "CCR/InsertAndPush-v0": (6.0, 4.0),
+    "CCR/SpatialPush-v0": (10.0, 16.0),
+}
 
 
 class Policy(Protocol):
@@ -47,8 +56,9 @@ def search(observation: Observation, angle: float = math.pi / 2) -> np.ndarray:
 class ForceController:
     """Proportional-integral control of the contact force's magnitude, after a search for contact at full speed.
 
-    The cable increment is the change of the controller's output (velocity form), so saturation winds nothing up. In
-    space both cables move along the way of the search.
+    What the sensor reads while nothing touches is taken off from then on. The cable increment is the change of the
+    controller's output (velocity form), so saturation winds nothing up. In space both cables move along the way of the
+    search; an insertion is left as it is.
 
     Attributes:
         proportional: Action per newton of change of the force error.
@@ -59,21 +69,35 @@ class ForceController:
     integral: float = 20.0
     name: str = "PI"
     _last: float | None = field(default=None, init=False)
+    _readings: list[np.ndarray] = field(default_factory=list, init=False)
+
+    @classmethod
+    def tuned(cls, env_id: str) -> "ForceController":
+        """With the gains of least force error on training scenes with realistic sensing."""
+        return cls(*PI_GAINS.get(env_id, PI_GAINS["CCR/PushObstacle-v0"]))
 
     def reset(self, env: Any = None) -> None:
-        """Forget the last error."""
+        """Forget the last error, and what the sensor read."""
         self._last = None
+        self._readings.clear()
 
     def act(self, observation: Observation) -> np.ndarray:
         """Pull until something touches, then control the force."""
         if not observation["contact"].any():
             self._last = None
+            self._readings.append(observation["force_measured"])
             return search(observation)
-        error = _lacking(observation)
+        error = self._lacking(observation)
         change = 0.0 if self._last is None else error - self._last
         self._last = error
         effort = min(max(self.proportional * change + self.integral * error, -1.0), 1.0)
         return np.asarray(effort * search(observation), np.float32)
+
+    def _lacking(self, observation: Observation) -> float:
+        """How much the force is smaller than its set-point [N]."""
+        tare = np.mean(self._readings, axis=0) if self._readings else 0.0
+        measured = np.linalg.norm(observation["force_measured"].astype(float) - tare)
+        return float(np.linalg.norm(observation["desired_force"]) - measured) * FORCE_SCALE_N
 
 
 @dataclass(slots=True)
@@ -88,7 +112,7 @@ class NewtonController:
         damping: Slope of the force below which it is not trusted [N/mm].
     """
 
-    damping: float = 1e-3
+    damping: float = 1e-4
     name: str = "Newton"
     _env: Any = field(default=None, init=False)
 
@@ -108,8 +132,12 @@ class NewtonController:
             slopes, lacking = slopes @ (truth.force / size)[:, None], np.array([truth.goal - size])
         else:
             lacking = truth.goal - truth.force
-        damped = slopes @ slopes.T + (truth.stiffness * self.damping) ** 2 * np.eye(len(slopes))
-        increments = np.linalg.solve(damped, slopes @ lacking)
+        (low, high), free = task.body.bounds(settings), np.ones(len(slopes), bool)
+        for _ in free:  # a motor at its bound leaves the rest to the other
+            damped = slopes @ slopes.T + (truth.stiffness * self.damping) ** 2 * np.eye(len(slopes))
+            increments = np.linalg.solve(damped, slopes @ lacking)
+            free &= np.where(increments > 0, truth.motors < high, truth.motors > low)
+            slopes = slopes * free[:, None]
         play = np.where(increments == 0, 0.0, truth.places + np.copysign(truth.slack, increments) - truth.motors)
         effort = (increments + play) / task.body.increments(settings)
         return np.asarray(effort / max(1.0, np.abs(effort).max()), np.float32)
@@ -123,11 +151,3 @@ class NewtonController:
         else:
             slopes = spatial_sensitivity(equilibrium).forces[CABLES]
         return np.asarray(slopes[:, counted].sum(axis=1))
-
-
-def _lacking(observation: Observation) -> float:
-    """How much the force is smaller than its set-point [N]."""
-    if observation["desired_force"].size == 1:
-        return float(observation["force_error"][0]) * FORCE_SCALE_N
-    wanted, measured = (np.linalg.norm(observation[key]) for key in ("desired_force", "force_measured"))
-    return float(wanted - measured) * FORCE_SCALE_N

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
-from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecMonitor, VecNormalize
 
 from agents.config import TrainConfig
 from agents.policy import Observation
@@ -18,9 +18,10 @@ POLICY, CONFIG, NORMALIZER = "policy.zip", "config.json", "normalizer.pkl"
 
 def learner(environments: VecEnv, config: TrainConfig) -> PPO:
     """An untrained PPO with the settings of a run, on environments whose observations are scaled."""
+    scaled = VecNormalize(VecMonitor(environments), gamma=config.gamma, clip_obs=10.0)
     return PPO(
         "MlpPolicy",
-        VecNormalize(VecMonitor(environments), gamma=config.gamma, clip_obs=10.0),
+        scaled if config.frames == 1 else VecFrameStack(scaled, config.frames),
         learning_rate=LinearSchedule(config.learning_rate, 0.0, 1.0),
         n_steps=config.rollout,
         batch_size=config.batch_size,
@@ -37,7 +38,8 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
     """Train and save; returns the run folder."""
     torch.set_num_threads(1)  # faster than more for networks this small
     config.run.mkdir(parents=True, exist_ok=True)
-    model = learner(FleetVecEnv(config.env_id, config.envs, config.seed, config.threads), config)
+    told = {"sensing": config.sensing, "split": "train"}
+    model = learner(FleetVecEnv(config.env_id, config.envs, config.seed, config.threads, **told), config)
     model.tensorboard_log = str(config.run)
     model.learn(config.steps, progress_bar=progress, tb_log_name="log")
     normalizer = model.get_vec_normalize_env()
@@ -77,12 +79,17 @@ class PPOPolicy:
                 raise FileNotFoundError(f"{run / piece} is missing; train first: ccr-gym train --run {run}")
         self.config = TrainConfig.load(run / CONFIG)
         self._model = PPO.load(run / POLICY, device="cpu")
+        self._seen: np.ndarray | None = None
         self._normalizer = VecNormalize.load(str(run / NORMALIZER), FleetVecEnv(self.config.env_id, 1))
 
     def reset(self, env: Any = None) -> None:
-        """Nothing to forget."""
+        """Forget what was seen before."""
+        self._seen = None
 
     def act(self, observation: Observation) -> np.ndarray:
         """The mean action for a dictionary observation."""
-        flat = np.concatenate(list(observation.values()))
-        return np.asarray(self._model.predict(self._normalizer.normalize_obs(flat), deterministic=True)[0])
+        flat = np.asarray(self._normalizer.normalize_obs(np.concatenate(list(observation.values()))))
+        if self._seen is None:
+            self._seen = np.zeros(self.config.frames * flat.size, np.float32)
+        self._seen = np.concatenate([self._seen[flat.size :], flat])
+        return np.asarray(self._model.predict(self._seen, deterministic=True)[0])

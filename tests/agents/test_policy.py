@@ -7,26 +7,41 @@ from ccr_gym import ENV_IDS
 
 
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
-@pytest.mark.parametrize(("policy", "count"), [(ForceController(), 20), (NewtonController(), 2)], ids=("PI", "Newton"))
-def test_classical_controllers_reach_the_set_point(env_id, policy, count):
-    summary = summarize(policy.name, run_episodes(policy, env_id, seed=50, count=count))
-    assert summary.median_error < 0.01
-    assert summary.success >= 0.95
+def test_proportional_integral_control_reaches_the_set_point(env_id):
+    summary = summarize("PI", run_episodes(ForceController.tuned(env_id), env_id, seed=50, count=20))
+    moving = "Track" in env_id  # which it follows with a delay
+    assert summary.median_error < (0.15 if moving else 0.01)
+    assert summary.success >= (0.3 if moving else 0.9)
     assert summary.contact_losses == 0
 
 
+@pytest.mark.parametrize("env_id", sorted(ENV_IDS))
+@pytest.mark.parametrize("sensing", ["ideal", "realistic"])
+def test_what_is_hidden_is_enough_to_be_exact(env_id, sensing):
+    for episode in run_episodes(NewtonController(), env_id, seed=50, count=2, sensing=sensing):
+        assert np.median(episode.error[-20:]) < 0.01
+
+
 def test_it_searches_until_something_touches_and_forgets():
-    controller = ForceController()
-    seen = {"desired_force": np.array([0.3], np.float32)}
-    free = {**seen, "contact": np.zeros(38, np.float32), "force_error": np.array([0.2], np.float32)}
-    touching = {**seen, "contact": np.ones(38, np.float32), "force_error": np.array([0.02], np.float32)}
+    controller, goal = ForceController(), np.array([0.3], np.float32)
+    sensor = lambda force: {"force_measured": np.array([0.0, force], np.float32), "desired_force": goal}  # noqa: E731
+    free = {**sensor(0.0), "contact": np.zeros(38, np.float32)}
+    touching, less = ({**sensor(force), "contact": np.ones(38, np.float32)} for force in (0.28, 0.26))
     assert controller.act(free) == 1
     first = controller.act(touching)
     assert 0 < first < 1
-    assert controller.act({**touching, "force_error": np.array([0.04], np.float32)}) > 2 * first
+    assert controller.act(less) > 2 * first
     controller.reset()
     assert controller.act(touching) == first
-    assert controller.act({**touching, "force_error": np.array([-1.0], np.float32)}) == -1
+    assert controller.act({**sensor(1.3), "contact": np.ones(38, np.float32)}) == -1
+
+
+def test_what_the_sensor_reads_without_contact_is_taken_off():
+    controller, goal = ForceController(), np.array([0.3], np.float32)
+    for reading, touching in (([0.02, -0.01], 0.0), ([0.04, -0.03], 0.0), ([0.03, 0.28], 1.0)):
+        seen = {"force_measured": np.array(reading, np.float32), "desired_force": goal}
+        action = controller.act({**seen, "contact": np.full(38, touching, np.float32)})
+    assert action == pytest.approx(0, abs=1e-6)
 
 
 def test_the_same_episodes_give_the_same_numbers():

@@ -5,9 +5,11 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import cli, ppo
 from agents.config import EvaluateConfig, TrainConfig
+from agents.sb3_adapter import FleetVecEnv
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +38,24 @@ def test_the_observation_is_scaled_as_in_training(run):
     statistics = policy._normalizer.obs_rms
     scaled = np.clip((observation - statistics.mean) / np.sqrt(statistics.var + 1e-8), -10, 10)
     assert policy._normalizer.normalize_obs(observation) == pytest.approx(scaled, abs=1e-5)
+
+
+def test_frames_are_stacked_as_in_training(tmp_path):
+    kwargs = {"sensing": "realistic", "frames": 3}
+    config = TrainConfig(run=tmp_path, steps=256, envs=2, batch_size=64, epochs=1, **kwargs)
+    policy = ppo.PPOPolicy(ppo.train(config, progress=False))
+    told = {"sensing": "realistic", "split": "train"}
+    environments = FleetVecEnv(config.env_id, 1, 7, **told)
+    normalizer = VecNormalize.load(str(tmp_path / ppo.NORMALIZER), environments)
+    normalizer.training = False
+    stacked = VecFrameStack(normalizer, 3)
+    env = gymnasium.make(config.env_id, disable_env_checker=True, **told)
+    rows, (observation, _) = stacked.reset(), env.reset(seed=7)
+    for _ in range(5):
+        action = policy.act(observation)
+        assert action == pytest.approx(policy._model.predict(rows[0], deterministic=True)[0], abs=1e-6)
+        rows, *_ = stacked.step(action[None])
+        observation, *_ = env.step(action)
 
 
 def test_a_missing_piece_is_named(run, tmp_path):
@@ -88,7 +108,10 @@ def test_an_unknown_environment_is_refused_by_the_command(tmp_path, monkeypatch)
         cli.main()
 
 
-@pytest.mark.parametrize("arguments", [("train", "--steps", "0"), ("evaluate", "--episodes", "0"), ("train", "--help")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("train", "--steps", "0"), ("evaluate", "--episodes", "0"), ("train", "--help"), ("train", "--frames", "0")],
+)
 def test_the_command_line_exits_before_any_work(arguments, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
         sys, "argv", ["ccr-gym", *arguments, *(() if "--help" in arguments else ("--run", str(tmp_path)))]
@@ -96,7 +119,8 @@ def test_the_command_line_exits_before_any_work(arguments, tmp_path, monkeypatch
     with pytest.raises(SystemExit):
         cli.main()
     written = capsys.readouterr()
-    assert "at least 1" in written.out + written.err or "--steps INT" in written.out
+    said = written.out + written.err
+    assert "at least 1" in said or "from 1 to 64" in said or "--steps INT" in written.out
 
 
 def test_training_and_evaluation_seeds_cannot_meet():
