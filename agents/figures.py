@@ -98,7 +98,7 @@ def draw_shape_in_space(axis: Any, equilibrium: SpatialEquilibrium) -> None:
     touched: np.ndarray = np.asarray(equilibrium.contact.any(axis=0))
     axis.plot(*equilibrium.points[touched].T, "o", color="crimson", ms=6, mfc="none")
     axis.set(xlim=(-90, 90), ylim=(-90, 90), zlim=(0, 180), xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
-    axis.set_box_aspect((1, 1, 1))
+    axis.set_box_aspect((1, 1, 1), zoom=0.85)
     axis.tick_params(labelsize=7)
 
 

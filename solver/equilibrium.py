@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.formulation import node_derivatives
 from solver.geometry import touching_points
-from solver.layout import CABLE, TENSION, Layout, layout
+from solver.layout import CABLE, LENGTH, TENSION, Layout, layout
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
@@ -190,6 +190,11 @@ class Equilibrium(BaseEquilibrium):
     def cable_mm(self) -> float:
         """Cable displacement l, which differs from the command after a stall or jam [mm]."""
         return float(self.block[CABLE])
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the backbone L0, which insertion changes [mm]."""
+        return float(self.block[LENGTH])
 
     @property
     def tension(self) -> float:

@@ -80,7 +80,7 @@ class Solver:
 
     def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
-        status, iterations = self._kernel.step(block, (cable_mm, length_mm), reached)
+        status, iterations = self._kernel.step(block, cable_mm, length_mm, reached)
         return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
 
 

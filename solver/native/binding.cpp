@@ -186,17 +186,30 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
              new (self) Scene<D>{read_obstacles<D>(kinds, parameters, extents, touchable, stiffness, laws)};
            },
            "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "stiffness"_a, "laws"_a);
-  nb::class_<Kernel<D>>(m, kernel, "Solver of one robot in one scene; holds scratch memory and no state between calls.")
+  nb::class_<Kernel<D>> solver(m, kernel, "Solver of one robot in one scene; holds scratch memory and no state between calls.");
+  solver
       .def("__init__",
            [](Kernel<D>* self, const ccr::Robot& robot, const Scene<D>& scene) {
              new (self) Kernel<D>(robot, scene.obstacles);
            },
            "robot"_a, "scene"_a)
       .def_prop_ro("block_size", &Kernel<D>::block_size, "Length of an equilibrium's block.")
-      .def("step", &Kernel<D>::step, "from_"_a, "command"_a, "to"_a,
-           "Follow the branch from one block to a command (cables, length) into another; (status, iterations).")
       .def("trace", &Kernel<D>::trace, "from_"_a, "command"_a,
            "Three numbers of each node of every shape accepted on the way, flattened.");
+  // A command in plain numbers, which take half a microsecond less than a tuple.
+  constexpr const char* step = "Follow the branch from one block to a command into another; (status, iterations).";
+  if constexpr (D == 2)
+    solver.def("step",
+               [](Kernel<2>& self, const Input& from, double cable, double length, const Output& to) {
+                 return self.step(from, {cable, length}, to);
+               },
+               "from_"_a, "cable"_a, "length"_a, "to"_a, step);
+  else
+    solver.def("step",
+               [](Kernel<3>& self, const Input& from, double first, double second, double length, const Output& to) {
+                 return self.step(from, {first, second, length}, to);
+               },
+               "from_"_a, "first"_a, "second"_a, "length"_a, "to"_a, step);
   nb::class_<Fleet<D>>(m, fleet, "Many robots alike, each in a scene of its own; their states are the caller's arrays.")
       .def("__init__",
            [](Fleet<D>* self, const ccr::Robot& robot, int count, int obstacles, int threads) {

@@ -41,10 +41,15 @@ double pull(const Vec<C>& cables) {
   return largest;
 }
 
-template <class Block, std::size_t N>
-void read(Block& block, std::array<double, N>& numbers) {
-  std::copy_n(block, N, numbers.begin());
-  block += N;
+// By loops, which for so few numbers are faster than the calls that copies become.
+template <std::size_t N>
+void read(const double*& block, std::array<double, N>& numbers) {
+  for (double& number : numbers) number = *block++;
+}
+
+template <std::size_t N>
+void write(const std::array<double, N>& numbers, double*& block, std::size_t count = N) {
+  for (std::size_t k = 0; k < count; ++k) *block++ = numbers[k];
 }
 
 }  // namespace
@@ -83,7 +88,7 @@ void Branch<Model>::load(const double* block) {
   ++block;
   for (auto& control : present_.controls) read(block, control.v);
   for (Position& node : nodes_) {
-    std::copy_n(block, kSpace, node.v.begin());
+    for (int k = 0; k < kSpace; ++k) node[k] = block[k];
     block += 3;
   }
   for (Frame& frame : frames_) read(block, frame.v);
@@ -125,13 +130,13 @@ template <class Model>
 void Branch<Model>::store(double* block) {
   Chain& chain = newton_.chain;
   const ActiveSet& active = present_.active;
-  const auto write = [&](const auto& numbers) { block = std::copy(numbers.v.begin(), numbers.v.end(), block); };
+  const auto write = [&](const auto& numbers) { ccr::write(numbers.v, block); };
   write(present_.command.cables);
   *block++ = present_.command.length;
   write(tensions_);
   *block++ = chain.objective();
   for (const auto& control : present_.controls) write(control);
-  for (const auto& state : chain.states()) block = std::copy_n(state.v.begin(), 3, block);
+  for (const auto& state : chain.states()) ccr::write(state.v, block, 3);
   for (const Frame& frame : chain.frames()) write(frame);
   std::fill_n(block, chain.contacts(), 0.0);
   for (int j = 0; j < active.count; ++j)

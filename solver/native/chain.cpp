@@ -83,7 +83,8 @@ template <class Model>
 bool Chain<Model>::evaluate(const Iterate& at) {
   if (!model_.evaluate(at.command, at.controls)) return false;
   load_springs(at.mounts);
-  for (int i = 0; i <= robot_.segments; ++i) std::copy_n(states()[i].v.begin(), kSpace, nodes_[i].v.begin());
+  for (int i = 0; i <= robot_.segments; ++i)
+    for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
   place_points<Model>(robot_, nodes_, frames(), points_);
   if constexpr (Model::kSliding)
     measure_gaps(model_.slack(at.command));

@@ -75,7 +75,8 @@ class SpatialSolver:
 
     def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
         reached = np.empty_like(block)
-        status, iterations = self._kernel.step(block, (*cables, self.robot.length_mm), reached)
+        first, second = cables.tolist()
+        status, iterations = self._kernel.step(block, first, second, self.robot.length_mm, reached)
         return SpatialEquilibrium(self.robot, self.scene, reached, Status(status), iterations)
 
 
