@@ -146,7 +146,9 @@ class Plane(Body):
 
     def told(self, blocks: np.ndarray, which: int | slice) -> dict[str, Any]:
         """Plain numbers for one robot, ``(N,)`` for many."""
-        return {"cable_mm": plain(blocks[..., CABLE], which), "tension": plain(blocks[..., TENSION], which)}
+        if isinstance(which, int):
+            return {"cable_mm": blocks.item(CABLE), "tension": blocks.item(TENSION)}
+        return {"cable_mm": blocks[..., CABLE].copy(), "tension": blocks[..., TENSION].copy()}
 
     def poses(self, robot: Robot, layout: Layout) -> Seen:
         """Place and angle of every node."""

@@ -45,6 +45,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self._renderer: Renderer | None = None
         self._started = False
         self.observation_space, self.action_space = single_spaces(self._fleet, self.settings)
+        self._shape = self.action_space.shape
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -80,8 +81,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         if not self._started:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         pull = np.asarray(action)
-        if pull.shape != self.action_space.shape or not all(map(math.isfinite, pull)):
-            raise ValueError(f"action is {action!r}; it must be finite numbers of shape {self.action_space.shape}")
+        if pull.shape != self._shape or not all(map(math.isfinite, pull)):
+            raise ValueError(f"action is {action!r}; it must be finite numbers of shape {self._shape}")
         fleet = self._fleet
         fleet.step(fleet.body.effort(pull), 0)
         reading = fleet.read(0)

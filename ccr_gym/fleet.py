@@ -76,6 +76,7 @@ class Fleet:
 
     def __init__(self, task: Task, settings: Settings, count: int, threads: int = 1) -> None:
         self._task, self._settings, self.body = task, settings, task.body
+        self._target, self._vector = task.target, task.force_vector
         self.count, self._threads = count, threads
         self.peaks = np.ones(count)  # magnitude of the set-point, or the highest of one that moves
         self._courses = np.ones((count, COURSE_STEPS)) if task.moving else None
@@ -107,7 +108,7 @@ class Fleet:
         """
         solver: Any = SpatialSolver if self.body.model is SPACE else Solver
         solver(self._settings.robot, assignment.scene)
-        least = 1 if self._task.target is None else self._task.target + 1
+        least = 1 if self._target is None else self._target + 1
         require(len(assignment.scene) >= least, f"the scene has {len(assignment.scene)} obstacles; it needs {least}")
         if len(assignment.scene) != self._layout.obstacles:
             require(self.count == 1, f"all scenes of several robots must have {self._layout.obstacles} obstacles")
@@ -124,7 +125,7 @@ class Fleet:
     ) -> None:
         """Begin episodes with set-points, magnitudes ``(k, 1)`` or vectors ``(k, d)`` [N]."""
         self.peaks[robots] = forces[:, 0]
-        if self._task.force_vector:
+        if self._vector:
             self._goals[robots] = forces
             self.peaks[robots] = _norm(forces)
         self.solver.rest(robots)
@@ -159,7 +160,7 @@ class Fleet:
 
     def read(self, which: int | slice = ALL) -> Reading:
         """What one robot or all of them feel now."""
-        blocks, target = self.solver.blocks[which], self._task.target
+        blocks, target = self.solver.blocks[which], self._target
         forces = self._layout.force(blocks) if target is None else self._layout.forces(blocks)[..., target, :]
         force_true = forces.copy()
         force_est = self.body.estimate(blocks, self._layout, force_true, which, self._settings)
@@ -167,8 +168,9 @@ class Fleet:
             stiffness = np.asarray(self._senses.stiffness[which])[..., None]
             force_true *= stiffness
             force_est *= stiffness * np.asarray(self._senses.grip[which])[..., None]
-        force, desired = plain(_norm(force_true), which), self._desired(0, which)
-        if self._task.force_vector:
+        force = plain(_norm(force_true), which)
+        desired = plain(self.peaks[which], which) if self._courses is None else self._desired(0, which)
+        if self._vector:
             goal = self._goals[which].copy()
             error = plain(_norm(goal - force_true), which) / desired
         else:
@@ -190,8 +192,12 @@ class Fleet:
         measured = reading.force_true
         if self._senses is not None:
             measured = told["force_measured"] = measured + self._senses.noise(self._time, which)
-        size = reading.force if self._senses is None else plain(_norm(measured), which)
-        told["force_error"] = reading.goal - (measured if self._task.force_vector else size)
+        if self._vector:
+            told["force_error"] = reading.goal - measured
+        else:
+            told["force_error"] = reading.goal - (
+                reading.force if self._senses is None else plain(_norm(measured), which)
+            )
         rows = self.observer.rows(reading.blocks, told, self._seen[which])
         if self._senses is not None:
             rows = self._senses.late(rows, self._time, which)
@@ -222,7 +228,7 @@ class Fleet:
     def truth(self, robot: int) -> Truth:
         """What is hidden of a robot."""
         senses, force = self._senses, self.read(robot).force_true
-        goal = self._goals[robot].copy() if self._task.force_vector else self._desired(1, robot)
+        goal = self._goals[robot].copy() if self._vector else self._desired(1, robot)
         places = np.atleast_1d(self.solver.blocks[robot, self.body.place]).copy()
         if senses is None:
             return Truth(force, 1.0, goal, places, places, np.zeros(places.size))
