@@ -107,7 +107,7 @@ class Plane(Body):
     def effort(self, actions: np.ndarray) -> Any:
         """A number for one robot, ``(N,)`` for many."""
         if actions.ndim == 1:
-            return min(max(float(actions[0]), -1.0), 1.0)
+            return min(max(actions.item(0), -1.0), 1.0)
         return np.minimum(np.maximum(actions[:, 0].astype(float), -1.0), 1.0)
 
     def bounds(self, settings: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -81,7 +81,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         if not self._started:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         pull = np.asarray(action)
-        if pull.shape != self._shape or not all(map(math.isfinite, pull)):
+        if pull.shape != self._shape or not all(map(math.isfinite, pull.tolist())):
             raise ValueError(f"action is {action!r}; it must be finite numbers of shape {self._shape}")
         fleet = self._fleet
         fleet.step(fleet.body.effort(pull), 0)

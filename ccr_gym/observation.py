@@ -83,9 +83,11 @@ class Observer:
         """
         rows = blocks[:, self._source] if blocks.ndim > 1 else blocks.take(self._source)
         rows *= self._scale
+        one = blocks.ndim == 1  # whose places are found faster without an ellipsis
         for key, force in told.items():
-            if key in self._told:
-                rows[..., self._told[key]] = force / FORCE_SCALE_N
+            place = self._told.get(key)
+            if place is not None:
+                rows[place if one else (..., place)] = force / FORCE_SCALE_N
         if "obstacle" in self._told:
             rows[..., self._told["obstacle"]] = obstacle * self._obstacle_scale
         return rows
