@@ -17,6 +17,7 @@ from solver.operations import ARRAYS, NUMBERS, Operations
 from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialRobot
 from solver.spatial import forces as spatial_forces
 from solver.spatial.equilibrium import spatial_layout
+from solver.spatial.robot import sides
 
 Which = int | slice | list[int]
 Seen = dict[str, tuple[np.ndarray, np.ndarray | float]]
@@ -163,10 +164,6 @@ class Insertion(Plane):
     settings, actions = InsertionSettings, 2
     place: ClassVar[int | slice] = slice(CABLE, LENGTH + 1)
 
-    def batch(self, settings: Any, count: int, obstacles: int, threads: int) -> BaseBatch:
-        """The solver."""
-        return BatchSolver(settings.robot, count, obstacles, threads)
-
     def bounds(self, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         """Of the cable, and of the length."""
         shortest, longest = settings.robot.lengths_mm
@@ -214,8 +211,7 @@ class Space(Body):
         if not force_true.any():
             return np.zeros(force_true.shape)
         slopes = layout.tip_slopes(blocks) * np.array([1.0, 1.0, 1.0, *2 * [settings.robot.offset_mm]])
-        sides = np.where(layout.cables(blocks) < 0, -1.0, 1.0)
-        loads = sides * layout.tensions(blocks) - layout.onset(blocks)
+        loads = sides(layout.cables(blocks)) * layout.tensions(blocks) - layout.onset(blocks)
         forces = spatial_forces.with_friction(force_true, slopes[..., :3], settings.friction)
         return np.asarray(spatial_forces.virtual_work(forces, loads, slopes)[..., None] * forces)
 
@@ -233,7 +229,7 @@ class Space(Body):
         }
 
     def obstacle(self, scene: Scene) -> np.ndarray:
-        """Centre over the robot's length, direction of the axis or zero, and radius over 20 mm; zero without one."""
+        """Centre [mm], direction of the axis or zero, and radius over 20 mm; zero without one."""
         seen = np.zeros(self.obstacle_size)
         for obstacle in scene.obstacles[:1]:
             seen[:3] = obstacle.extent.center

@@ -1,5 +1,4 @@
-"""The docstrings of the registered environments: what they have in common, and tables of what is seen, from the "
-"source."""
+"""The docstrings of the registered environments: what they have in common, and tables of what is seen."""
 
 import textwrap
 from typing import Any
@@ -32,36 +31,30 @@ def describe(task: Task, title: str, description: str, start: str, *, action: st
     seen = "magnitudes, or vectors with `force_vector` where their difference is taken" if count == 3 else "magnitudes"
     parts = {
         "Description": description,
-        "Action Space": f"`Box(-1, 1, ({body.actions},), float32)`: {action}. It is carried out as far as tension "
-        f"limit and "
-        f"obstacles allow; {cables} within {'±' if count == 3 else '0 to '}`cable_limit_mm` "
-        f"({settings.cable_limit_mm:g} mm).",
-        "Observation Space": 'With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their '
-        "concatenation in this "
-        f"order. Indices are of the flat form for the default robot of n = {settings.robot.segments} segments and "
-        f"ideal "
-        "sensing; everything is clipped to its bounds.\n\n" + table(task, settings) + "\n\n"
-        "Without `force_sensor` the keys `force_error` and `force_measured` are absent.",
-        "Rewards": f'The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the '
-        f"set-point, {seen}: "
-        "`force_error` −min(|F−F_d|/F_d, 1); `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot` −min(max(F/F_d−1, 0), "
-        "1) / 2; "
-        "`approach` minus the clearance in units of 100 mm while nothing touches; `effort` −0.02 times the mean "
-        "square of "
-        "the action.",
+        "Action Space": f"""`Box(-1, 1, ({body.actions},), float32)`: {action}. It is carried out as far as tension
+            limit and obstacles allow; {cables} within {"±" if count == 3 else "0 to "}`cable_limit_mm`
+            ({settings.cable_limit_mm:g} mm).""",
+        "Observation Space": f"""With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their
+            concatenation in this order. Indices are of the flat form for the default robot of
+            n = {settings.robot.segments} segments and ideal sensing; everything is clipped to its bounds.
+
+{table(task, settings)}
+
+            Without `force_sensor` the keys `force_error` and `force_measured` are absent.""",
+        "Rewards": f"""The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the
+            set-point, {seen}: `force_error` −min(|F−F_d|/F_d, 1); `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot`
+            −min(max(F/F_d−1, 0), 1) / 2; `approach` minus the clearance in units of 100 mm while nothing touches;
+            `effort` −0.02 times the mean square of the action.""",
         "Starting State": start,
         "Episode End": f"No state is terminal. Episodes are truncated after {task.steps} steps.",
-        "Info": f"`force_true` and `force_est` (force on the robot, ({count},) [N]), `desired_force` [N], "
-        f"`cable_mm`, `tension` "
-        "[N], `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]), `is_success` "
-        "(within "
-        "5 % of the set-point), `reward_terms`.",
-        "Arguments": f"`render_mode`, the fields of `ccr_gym.settings.{type(settings).__name__}`, and `task`: "
-        f"`{type(task).__name__}` or a mapping of its fields; mappings make every argument JSON-able. "
-        f'`sensing="realistic"` '
-        "puts backlash, latency, noise, bias, unknown friction and unknown rigidity between robot and agent, each "
-        "episode's "
-        'own; `split="train"` and `split="test"` draw from scenes that have none in common.',
+        "Info": f"""`force_true` and `force_est` (force on the robot, ({count},) [N]), `desired_force` [N], `cable_mm`,
+            `tension` [N], `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]),
+            `is_success` (within 5 % of the set-point), `reward_terms`.""",
+        "Arguments": f"""`render_mode`, the fields of `ccr_gym.settings.{type(settings).__name__}`, and `task`:
+            `{type(task).__name__}` or a mapping of its fields; mappings make every argument JSON-able.
+            `sensing="realistic"` puts backlash, latency, noise, bias, unknown friction and unknown rigidity between
+            robot and agent, each episode's own; `split="train"` and `split="test"` draw from scenes that have none in
+            common.""",
         "Version History": "* v0: initial version.",
     }
     sections = [f"## {name}\n{_wrapped(text)}" for name, text in parts.items()]

@@ -17,14 +17,12 @@ from ccr_gym.tasks import (
 from ccr_gym.vector_env import ContactVectorEnv
 
 FOUND = (
-    "drawn again until the straight robot is clear of it and a steady pull reaches the set-point without a stall, "
-    "jam or "
-    "snap."
+    "drawn again until the straight robot is clear of it and a steady pull reaches the set-point without a stall, jam "
+    "or snap."
 )
 CIRCLE = (
-    "The straight robot, cable slack. The obstacle's centre is uniform in 35–75 × 75–150 mm, its radius in 10–16 "
-    "mm, the "
-    "set-point in 20–150 mN, "
+    "The straight robot, cable slack. The obstacle's centre is uniform in 35–75 × 75–150 mm, its radius in 10–16 mm, "
+    "the set-point in 20–150 mN, "
 )
 
 
@@ -53,14 +51,11 @@ class LoadCellEnv(TaskEnv):  # noqa: D101 - below
     __doc__ = describe(
         LoadCell(),
         "Hold a set-point force on the paper's load cell (Fig. 8–10).",
-        "A flat load cell stands at a random distance from a planar cable-driven continuum robot. Pulling the "
-        "cable bends "
-        "the robot towards it until node 14, the paper's 15th, meets it (eq. 12); pulling on raises the contact "
-        "force. The "
-        "agent commands cable increments and is to hold a desired force.",
+        "A flat load cell stands at a random distance from a planar cable-driven continuum robot. Pulling the cable "
+        "bends the robot towards it until node 14, the paper's 15th, meets it (eq. 12); pulling on raises the contact "
+        "force. The agent commands cable increments and is to hold a desired force.",
         "The straight robot, cable slack. The distance is uniform in 24–51 mm and the set-point in 10–60 mN, drawn "
-        "again "
-        "until a steady pull reaches the set-point.",
+        "again until a steady pull reaches the set-point.",
     )
 
 
@@ -69,11 +64,10 @@ class PushObstacleEnv(TaskEnv):  # noqa: D101 - below
     __doc__ = describe(
         PushObstacle(),
         "Find a circular obstacle and push it with a desired force.",
-        "A circular obstacle of random position and size lies somewhere in front of a planar cable-driven "
-        "continuum robot. "
-        "Pulling the cable bends the robot towards it; where and when it touches, and how the force then grows "
-        "with the "
-        "cable, depends on the scene. The agent commands cable increments and is to hold a desired contact force.",
+        "A circular obstacle of random position and size lies somewhere in front of a planar cable-driven continuum "
+        "robot. Pulling the cable bends the robot towards it; where and when it touches, and how the force then grows "
+        "with the cable, depends on the scene. The agent commands cable increments and is to hold a desired contact "
+        "force.",
         CIRCLE + FOUND,
     )
 
@@ -83,9 +77,8 @@ class TrackForceEnv(TaskEnv):  # noqa: D101 - below
     __doc__ = describe(
         TrackForce(),
         "Push a circular obstacle with a force that steps and swings.",
-        "As `PushObstacle`, but the set-point moves: it swings about a level that changes three times in an "
-        "episode. It is "
-        "seen some steps ahead, so that an agent that knows its robot can follow without delay.",
+        "As `PushObstacle`, but the set-point moves: it swings about a level that changes three times in an episode. "
+        "It is seen some steps ahead, so that an agent that knows its robot can follow without delay.",
         CIRCLE
         + "which is the highest of the episode; its levels are 30–100 % of that before they are scaled to it, the "
         "swing 10–40 % of the level with a period of 24–64 steps; " + FOUND,
@@ -98,11 +91,10 @@ class BracedPushEnv(TaskEnv):  # noqa: D101 - below
         BracedPush(),
         "Brace on one obstacle and push another with a desired force.",
         "Two circular obstacles as in the paper's Fig. 4b. The robot meets the lower one, leans on it, and reaches "
-        "the upper "
-        "one beyond, whose contact force is to be held; what the lower one carries changes with it. Slips are "
-        "within reach.",
-        "The straight robot, cable slack. Centre and radius of the lower obstacle are uniform in 27–38 × 75–95 mm "
-        "and 10–14 "
+        "the upper one beyond, whose contact force is to be held; what the lower one carries changes with it. Slips "
+        "are within reach.",
+        "The straight robot, cable slack. Centre and radius of the lower obstacle are uniform in 27–38 × 75–95 mm and "
+        "10–14 "
         "mm, those of the upper one in 52–72 × 125–150 mm and 12–16 mm, the set-point in 20–120 mN, " + FOUND,
     )
 
@@ -113,8 +105,7 @@ class SoftObstacleEnv(TaskEnv):  # noqa: D101 - below
         SoftObstacle(),
         "Push an obstacle on a spring of unknown stiffness with a desired force.",
         "As `PushObstacle`, but the obstacle is mounted on a spring and gives way. The stiffness varies more than "
-        "tenfold "
-        "from episode to episode, and so does how much force a millimetre of cable is worth.",
+        "tenfold from episode to episode, and so does how much force a millimetre of cable is worth.",
         CIRCLE + "the stiffness in 0.003–0.1 N/mm, evenly in its logarithm; " + FOUND,
     )
 
@@ -125,8 +116,7 @@ class InsertAndPushEnv(TaskEnv):  # noqa: D101 - below
         InsertAndPush(),
         "Push an obstacle with the cable and the insertion of the base.",
         "A circular obstacle in front of a planar robot whose cable slides through its disks, and whose base can "
-        "insert it "
-        "by 20 mm either way. Both actions change the contact force.",
+        "insert it by 20 mm either way. Both actions change the contact force.",
         "The straight robot, 160 mm long, cable slack. The obstacle's centre is uniform in 35–75 × 75–130 mm, its "
         "radius in "
         "10–16 mm, the set-point in 20–150 mN, " + FOUND,
@@ -141,24 +131,17 @@ class SpatialPushEnv(TaskEnv):  # noqa: D101 - below
         SpatialPush(),
         "Push a sphere or a cylinder in space with a desired force.",
         "A sphere or a cylinder of random position and size stands anywhere around a cable-driven continuum robot "
-        "with two "
-        "pairs of opposite cables (eq. 13). Pulling them bends the robot towards any side. The agent commands both "
-        "increments and is to hold a desired contact force. Pressed in its middle, a sphere lets the robot slip to "
-        "either "
+        "with two pairs of opposite cables (eq. 13). Pulling them bends the robot towards any side. The agent "
+        "commands both increments and is to hold a desired contact force. Pressed in its middle, a sphere lets the "
+        "robot slip to either "
         'side once the force is high enough. With `task={"force_vector": True}` magnitude and direction are asked '
-        "for: "
-        "`desired_force` and `force_error` are vectors of three numbers in [-1, 1], and the indices after them "
-        "grow by two "
-        "or four.",
-        "The straight robot, cables slack. The obstacle stands at a uniform azimuth, its centre 35–65 mm off the "
-        "axis and "
-        "80–150 mm high, its radius uniform in 10–16 mm; half of them are cylinders of 60 mm across the way of the "
-        "robot, "
-        "tilted by up to 30°. The set-point is uniform in 20–150 mN, drawn again until a steady pull towards the "
-        "obstacle "
-        "reaches it without a stall, jam or snap. With `force_vector` that pull is up to 0.25 rad aside of the "
-        "obstacle, and "
-        "the force it gets to is the set-point.",
+        "for: `desired_force` and `force_error` are vectors of three numbers in [-1, 1], and the indices after them "
+        "grow by two or four.",
+        "The straight robot, cables slack. The obstacle stands at a uniform azimuth, its centre 35–65 mm off the axis "
+        "and 80–150 mm high, its radius uniform in 10–16 mm; half of them are cylinders of 60 mm across the way of "
+        "the robot, tilted by up to 30°. The set-point is uniform in 20–150 mN, drawn again until a steady pull "
+        "towards the obstacle reaches it without a stall, jam or snap. With `force_vector` that pull is up to 0.25 "
+        "rad aside of the obstacle, and the force it gets to is the set-point.",
         action="increments of both signed displacements as fractions of `max_increment_mm`; a positive displacement "
         "pulls the first cable of a pair, a negative one the opposite cable",
     )

@@ -196,7 +196,6 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
       .def_prop_ro("block_size", &Kernel<D>::block_size, "Length of an equilibrium's block.")
       .def("trace", &Kernel<D>::trace, "from_"_a, "command"_a,
            "Three numbers of each node of every shape accepted on the way, flattened.");
-  // A command in plain numbers, which take half a microsecond less than a tuple.
   constexpr const char* step = "Follow the branch from one block to a command into another; (status, iterations).";
   if constexpr (D == 2)
     solver.def("step",

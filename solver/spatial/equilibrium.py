@@ -11,7 +11,7 @@ from solver.formulation import GapLaw, first_derivatives
 from solver.geometry import divided
 from solver.layout import SPACE, Layout, make_layout
 from solver.spatial.formulation import spatial_problem
-from solver.spatial.robot import SpatialRobot
+from solver.spatial.robot import SpatialRobot, sides
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,8 +52,9 @@ class SpatialEquilibrium(BaseEquilibrium):
     @property
     def pulled(self) -> np.ndarray:
         """Points of the pulled cables of both pairs on each disk, ``(2, n+1, 3)`` [mm]."""
-        sides = np.where(self.cables_mm < 0, -1.0, 1.0)[:, None]
-        return np.asarray(self.nodes + np.einsum("nij,kj->kni", self.frames, sides * self.robot.holes))
+        return np.asarray(
+            self.nodes + np.einsum("nij,kj->kni", self.frames, sides(self.cables_mm)[:, None] * self.robot.holes)
+        )
 
     @property
     def points(self) -> np.ndarray:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.spatial.equilibrium import SpatialEquilibrium
+from solver.spatial.robot import sides
 
 TINY = 1e-300  # keeps quotients defined where nothing pushes
 
@@ -69,7 +70,7 @@ class SpatialVirtualWork:
         """Estimated contact force, ``(m, 3)`` [N]."""
         slopes = equilibrium.tip_slopes
         forces = with_friction(equilibrium.forces, slopes[:, :3], self.friction)
-        loads = np.where(equilibrium.cables_mm < 0, -1.0, 1.0) * equilibrium.tensions - equilibrium.onset_tensions
+        loads = sides(equilibrium.cables_mm) * equilibrium.tensions - equilibrium.onset_tensions
         return np.asarray(virtual_work(forces.sum(axis=0), loads, slopes) * forces)
 
 

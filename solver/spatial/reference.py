@@ -12,7 +12,7 @@ from solver.scene import Scene
 from solver.solve import check_clear, check_width
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import spatial_problem
-from solver.spatial.robot import SpatialRobot
+from solver.spatial.robot import SpatialRobot, sides
 from solver.spatial.solve import check_cables, check_space
 from solver.status import Status
 
@@ -105,13 +105,14 @@ class SpatialReferenceSolver:
         held = -multipliers[self._equalities :]
         held[held < np.abs(solution["g"].full().ravel()[self._equalities :])] = 0.0  # what the barrier left
         slopes = unit**2 * self._cable_slopes(reached, parameters, multipliers).full().ravel()
-        tensions = np.where(cables < 0, -1.0, 1.0) * slopes * self.robot.stiffness
+        tensions = sides(cables) * slopes * self.robot.stiffness
         n = self.robot.segments
         nodes, first, second = (np.vstack([np.zeros(3), part]) for part in reached[: 9 * n].reshape(3, n, 3))
-        sides = np.where(cables < 0, -1.0, 1.0)
         disks = np.stack([first[1:] - nodes[1:], second[1:] - nodes[1:]], axis=1)  # (n, 2, 3)
         frames = np.tile(np.eye(3), (n + 1, 1, 1))
-        frames[1:, :, :2] = np.swapaxes(np.linalg.solve((sides[:, None] * self.robot.holes)[:, :2], disks), 1, 2)
+        frames[1:, :, :2] = np.swapaxes(
+            np.linalg.solve((sides(cables)[:, None] * self.robot.holes)[:, :2], disks), 1, 2
+        )
         frames[1:, :, 2] = np.cross(frames[1:, :, 0], frames[1:, :, 1])
         return self._equilibrium(
             cables, tensions, nodes, frames, unit**2 * held, reached[9 * n :], int(stats["iter_count"])
@@ -134,7 +135,7 @@ class SpatialReferenceSolver:
         nodes[1:] = length * np.cumsum(np.sin(middles)[:, None] * direction + np.cos(middles)[:, None] * up, axis=0)
         half_sines = cables / (2 * n * self.robot.offset_mm)
         slopes = 4 * np.arcsin(half_sines) / np.sqrt(1 - half_sines**2) / self.robot.offset_mm
-        tensions = np.where(cables < 0, -1.0, 1.0) * self.robot.stiffness * slopes
+        tensions = sides(cables) * self.robot.stiffness * slopes
         return self._equilibrium(cables, tensions, nodes, frames, None, None, 0)
 
     def _equilibrium(

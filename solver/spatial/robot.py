@@ -10,6 +10,11 @@ from solver.robot import check_numbers, require_positive
 LINES = ("backbone", "holes", "rim")
 
 
+def sides(cables_mm: np.ndarray) -> np.ndarray:
+    """Which cables of the pairs are pulled: 1 for the first ones, −1 for those opposite to them."""
+    return np.where(cables_mm < 0, -1.0, 1.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpatialRobot:
     """A cable-driven continuum robot in space, clamped at the origin and pointing along +z.

@@ -10,7 +10,7 @@ from solver.formulation import GapLaw, second_derivatives
 from solver.sensitivity import respond
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.formulation import spatial_problem
-from solver.spatial.robot import SpatialRobot
+from solver.spatial.robot import SpatialRobot, sides
 
 CABLES, LENGTH = slice(0, 2), 2  # rows of a SpatialSensitivity
 MOTIONS = 7  # of an obstacle
@@ -73,20 +73,20 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
     displacements[:, list(scene.mounted)] = mounts.reshape(len(loads), -1, 3)
     nodes = np.zeros((3, len(loads), robot.segments + 1, 3))  # of backbone and holes
     nodes[:, :, 1:] = np.swapaxes(lines.reshape(len(loads), 3, robot.segments, 3), 0, 1)
-    sides = np.where(equilibrium.cables_mm < 0, -1.0, 1.0)
+    pulled = sides(equilibrium.cables_mm)
     return SpatialSensitivity(
         nodes=nodes[0],
-        turns=_turns(equilibrium, nodes[1:] - nodes[0], sides),
+        turns=_turns(equilibrium, nodes[1:] - nodes[0], pulled),
         multipliers=change.multipliers,
-        tensions=equilibrium.stiffness * sides * loads[:, CABLES],
+        tensions=equilibrium.stiffness * pulled * loads[:, CABLES],
         forces=equilibrium.stiffness * forces,
         displacements=displacements,
     )
 
 
-def _turns(equilibrium: SpatialEquilibrium, disks: np.ndarray, sides: np.ndarray) -> np.ndarray:
+def _turns(equilibrium: SpatialEquilibrium, disks: np.ndarray, pulled: np.ndarray) -> np.ndarray:
     """Turns of the disks from the motion of their holes, ``(q, n+1, 3)``: half the sum of e × δe over their axes."""
-    holes = sides[:, None] * equilibrium.robot.holes[:, :2]
+    holes = pulled[:, None] * equilibrium.robot.holes[:, :2]
     first, second = np.tensordot(np.linalg.inv(holes), disks, axes=1)
     x, y, z = np.moveaxis(equilibrium.frames, 2, 0)
     third = np.cross(first, y) + np.cross(x, second)

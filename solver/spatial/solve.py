@@ -26,8 +26,7 @@ class SpatialSolver:
 
     Raises:
         ValueError: If an obstacle is one of the plane, overlaps the straight robot, is narrow enough to slip between
-        its
-            points, or names a node the robot does not have.
+            its points, or names a node the robot does not have.
     """
 
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
@@ -50,9 +49,9 @@ class SpatialSolver:
         A cable whose tension reaches the limit stops there, and the other goes on by itself.
 
         Args:
-            equilibrium: Where the robot is, from this solver or one of an equal robot and scene. cables_mm:
-            Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign tells which of its cables
-                is pulled.
+            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
+            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign tells which of its
+                cables is pulled.
 
         Returns:
             The equilibrium reached; its ``status`` says how. While anything touches, the cables are not slackened
