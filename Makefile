@@ -5,9 +5,9 @@ INSTALL := $(VENV)/.installed
 
 .PHONY: demo test bench instructions soak lint clean
 
-demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controller, write a figure and a video to runs/demo
+demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controllers, write figures and videos to runs/demo
 	$(BIN)/ccr-gym train --run runs/demo
-	$(BIN)/ccr-gym evaluate --run runs/demo
+	$(BIN)/ccr-gym evaluate --runs runs/demo --out runs/demo
 
 test: $(INSTALL)
 	$(BIN)/python -m pytest -n auto --dist worksteal

@@ -1,61 +1,79 @@
-"""Settings of a training run."""
+"""What the commands are told."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-EVALUATION_SEED = 1_000_000  # training seeds stay below, evaluation seeds begin here
+import tyro
+
+from agents.tuned import LEARNERS, DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings
+from ccr_gym import ENV_IDS
+
+VALIDATION_SEED = 900_000  # training seeds stay below; learning curves are of seeds from here on
+VALIDATION_EPISODES = 64
+EVALUATION_SEED = 1_000_000  # evaluation seeds begin here
+
+POLICIES = ("P", "PI", "MPC", "Newton", *LEARNERS, "Oracle")
+PRETRAINED = Path(__file__).parent / "pretrained"
+
+Learner = (
+    Annotated[PPOSettings, tyro.conf.subcommand("ppo")]
+    | Annotated[SACSettings, tyro.conf.subcommand("sac")]
+    | Annotated[RecurrentPPOSettings, tyro.conf.subcommand("recurrent")]
+    | Annotated[DistilledSettings, tyro.conf.subcommand("distilled")]
+)
 
 
 @dataclass(frozen=True, slots=True)
 class TrainConfig:
-    """Train PPO on an environment; the defaults solve CCR/PushObstacle-v0."""
+    """Train a policy on an environment, or go on with a run that was interrupted."""
 
     run: Path = Path("runs/ppo")
-    """Folder for policy, configuration, normaliser and TensorBoard log."""
+    """Folder for actor, configuration, checkpoints, learning curve and TensorBoard log."""
     env_id: str = "CCR/PushObstacle-v0"
     """Environment to train on."""
-    sensing: Literal["ideal", "realistic"] = "ideal"
+    sensing: Literal["ideal", "realistic"] = "realistic"
     """What stands between robot and learner: nothing, or backlash, latency, noise and what is unknown."""
     seed: int = 0
-    """Seed of the learner and of the first environment's scenes; below 1 000 000, where evaluation begins."""
-    steps: int = 160_000
-    """Environment steps to train for."""
-    envs: int = 32
-    """Environments stepped side by side."""
+    """Seed of the learner and of the first environment's scenes; below 900 000, where validation begins."""
     threads: int = 2
     """Threads of the solver; results do not depend on them."""
-    rollout: int = 64
-    """Steps of each environment between updates."""
-    batch_size: int = 512
-    """Samples of one gradient step."""
-    epochs: int = 8
-    """Passes over a rollout."""
-    learning_rate: float = 1e-3
-    """Of Adam, decaying linearly to zero."""
-    gamma: float = 0.9
-    """Discount of rewards."""
-    gae_lambda: float = 0.9
-    """Decay of advantages."""
-    log_std_init: float = -0.5
-    """Logarithm of the first exploration noise."""
-    width: int = 64
-    """Units in each of the two hidden layers."""
-    frames: int = 1
-    """Observations that are seen at once, the latest last."""
+    learner: Annotated[Learner, tyro.conf.arg(name="")] = field(default_factory=PPOSettings)
+    """The learner and its settings."""
 
     def __post_init__(self) -> None:
-        if self.steps < 1:
-            raise ValueError(f"steps is {self.steps}; it must be at least 1")
-        if not 1 <= self.frames <= 64:
-            raise ValueError(f"frames is {self.frames}; it must be from 1 to 64")
-        if not 0 <= self.seed <= EVALUATION_SEED - self.envs:
-            raise ValueError(f"seed is {self.seed}; it must be from 0 to {EVALUATION_SEED - self.envs}")
+        learner = self.learner
+        for name in ("steps", "envs", "batch_size", "width"):
+            value = getattr(learner, name)
+            if value < 1:
+                raise ValueError(f"{name} is {value}; it must be at least 1")
+        if not 0 <= self.seed <= VALIDATION_SEED - learner.envs:
+            raise ValueError(f"seed is {self.seed}; it must be from 0 to {VALIDATION_SEED - learner.envs}")
+
+    def dumps(self) -> str:
+        """As JSON."""
+        learner = {"name": self.learner.name, **asdict(self.learner)}
+        return json.dumps({**asdict(self), "run": str(self.run), "learner": learner}, indent=2)
 
     def save(self, path: Path) -> None:
         """Write as JSON."""
-        path.write_text(json.dumps(asdict(self) | {"run": str(self.run)}, indent=2) + "\n")
+        path.write_text(self.dumps() + "\n")
+
+    @classmethod
+    def loads(cls, text: str) -> "TrainConfig":
+        """Read what :meth:`dumps` gave.
+
+        Raises:
+            ValueError: If it is something else.
+        """
+        try:
+            values = json.loads(text)
+            settings = dict(values["learner"])
+            learner = LEARNERS[settings.pop("name")](**settings)
+            return cls(**values | {"run": Path(values["run"]), "learner": learner})
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(f"it is not the configuration of a training run: {error!r}") from error
 
     @classmethod
     def load(cls, path: Path) -> "TrainConfig":
@@ -65,32 +83,93 @@ class TrainConfig:
             ValueError: If it is something else.
         """
         try:
-            values = json.loads(path.read_text())
-            return cls(**values | {"run": Path(values["run"])})
-        except (ValueError, KeyError, TypeError) as error:
-            raise ValueError(f"{path} is not the configuration of a training run: {error!r}") from error
+            return cls.loads(path.read_text())
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class RetrainConfig:
+    """Train every learned baseline on every environment, as the shipped policies were."""
+
+    out: Path = Path("runs/retrain")
+    """Folder for the runs; those that are there are not trained again, and interrupted ones go on."""
+    learners: tuple[str, ...] = tuple(LEARNERS)
+    """Which learners."""
+    env_ids: tuple[str, ...] = tuple(ENV_IDS)
+    """Which environments."""
+    seeds: int = 5
+    """Training seeds of each."""
+    share: float = 1.0
+    """Share of the tuned number of steps: less for a quick look."""
+    jobs: int = 2
+    """Runs side by side, each on one thread."""
+
+    def __post_init__(self) -> None:
+        _known("learners", self.learners, tuple(LEARNERS))
+        _known("env_ids", self.env_ids, tuple(ENV_IDS))
+        if not 0 < self.share <= 1:
+            raise ValueError(f"share is {self.share}; it must be above 0 and at most 1")
+        for name in ("seeds", "jobs"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluateConfig:
-    """Evaluate a trained policy beside the classical controllers, on scenes it was never trained on."""
+    """Evaluate policies on test scenes they were never trained or tuned on: table, figures, videos, JSON."""
 
-    run: Path = Path("runs/ppo")
-    """Folder of the training run; results are written there too."""
+    out: Path = Path("runs/evaluation")
+    """Folder for the results."""
+    runs: tuple[Path, ...] = ()
+    """Folders of training runs, evaluated on their own environments in the place of the shipped policies."""
+    pretrained: Path = PRETRAINED
+    """Folder of trained policies, as `ccr-gym retrain` fills it; by default those that come with the package."""
+    env_ids: tuple[str, ...] = tuple(ENV_IDS)
+    """Which environments, where no runs are given."""
+    policies: tuple[str, ...] = POLICIES
+    """Which policies; learners are the shipped ones, or those of the runs."""
     episodes: int = 100
-    """Episodes for each policy, the same for all."""
+    """Episodes of every policy and environment, the same scenes for all."""
     seed: int = EVALUATION_SEED
     """Seed of the first evaluation scene; at least 1 000 000, beyond those of training."""
     video: bool = True
-    """Whether to render the first episodes to a video."""
-    video_episodes: int = 4
-    """Episodes in the video."""
+    """Whether to render an episode of every policy and environment to a video."""
+    jobs: int = 2
+    """Processes."""
 
     def __post_init__(self) -> None:
-        if self.episodes < 1:
-            raise ValueError(f"episodes is {self.episodes}; it must be at least 1")
+        _known("env_ids", self.env_ids, tuple(ENV_IDS))
+        _known("policies", self.policies, POLICIES)
+        for name in ("episodes", "jobs"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
         if self.seed < EVALUATION_SEED:
             raise ValueError(f"seed is {self.seed}; it must be at least {EVALUATION_SEED}, beyond the training seeds")
+
+
+@dataclass(frozen=True, slots=True)
+class SweepConfig:
+    """Search settings of a controller or a learner on training scenes, with Optuna."""
+
+    what: Literal["P", "PI", "MPC", "Newton", "PPO", "SAC", "RecurrentPPO", "Distilled"] = "PI"
+    """Whose settings."""
+    env_id: str = "CCR/PushObstacle-v0"
+    """On which environment."""
+    trials: int = 50
+    """Trials to add to the study."""
+    episodes: int = 48
+    """Episodes a trial is judged by."""
+    steps: int = 300_000
+    """Environment steps a learner is trained for in a trial."""
+    out: Path = Path("runs/sweep")
+    """Folder for the study, which goes on where it was left."""
+
+    def __post_init__(self) -> None:
+        _known("env_id", (self.env_id,), tuple(ENV_IDS))
+        for name in ("trials", "episodes", "steps"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,3 +192,9 @@ class ReproduceConfig:
 
     out: Path = Path("runs/paper")
     """Folder for paper.png and paper.json."""
+
+
+def _known(name: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:
+    unknown = [value for value in given if value not in known]
+    if unknown or not given:
+        raise ValueError(f"{name} is {list(given)}; it must name some of {', '.join(known)}")

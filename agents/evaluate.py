@@ -1,8 +1,7 @@
-"""Policies on the same unseen episodes, and what they achieve."""
+"""Episodes of policies on unseen scenes, and what is measured of them."""
 
 import time
-from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import gymnasium
@@ -13,6 +12,8 @@ from agents.policy import Policy
 from solver import Status
 
 TOLERANCE = 0.05  # relative force error that counts as reached
+SEARCH = 24  # steps in which contact is found, which do not count
+STEADY = 16  # last steps, of the steady-state error
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,19 +21,23 @@ class Episode:
     """One episode, step by step.
 
     Attributes:
-        desired: Magnitude of the set-point [N].
+        goal: Magnitude of the set-point that holds after every step, ``(k,)`` [N].
         lacking: How far the force is from the set-point after every step, of magnitudes or vectors, ``(k,)`` [N].
+        misread: The same of the virtual-work estimate, ``(k,)`` [N].
         true: True contact force magnitude after every step, ``(k,)`` [N].
         estimated: Virtual-work estimate of it, ``(k,)`` [N].
+        cost: Force above the limit after every step, ``(k,)`` [N].
         statuses: Solver status of every step.
-        equilibria: Equilibrium after every step.
+        equilibria: Equilibrium after every step, if they were to be kept.
         seconds: Time the policy took for its decisions [s].
     """
 
-    desired: float
+    goal: np.ndarray
     lacking: np.ndarray
+    misread: np.ndarray
     true: np.ndarray
     estimated: np.ndarray
+    cost: np.ndarray
     statuses: tuple[Status, ...]
     equilibria: tuple[Any, ...]
     seconds: float
@@ -40,65 +45,84 @@ class Episode:
     @property
     def error(self) -> np.ndarray:
         """Relative force error after every step, ``(k,)``."""
-        return np.asarray(self.lacking / self.desired)
+        return np.asarray(self.lacking / self.goal)
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
-    """What a policy achieved over its episodes.
+class Metrics:
+    """What one episode comes to.
 
     Attributes:
-        policy: Its name.
-        median_error: Median of the final relative force error.
-        mean_error: Mean of it.
-        median_error_mn: Median of the final force error [mN].
-        success: Share of episodes that end within 5 % of the set-point.
-        settling_steps: Median step after which the error stays within 5 %, of the episodes that end there.
-        peak_overshoot: Median of the largest force above the set-point, relative to it.
-        contact_losses: Mean number of times an episode loses contact.
-        statuses: Solver statuses counted over all steps.
-        decisions_per_second: Decisions of the policy per second.
+        rmse_mn: Root mean square force error after the steps of the search [mN]; what policies are ranked by.
+        estimate_rmse_mn: The same of the virtual-work estimate [mN].
+        steady_mn: Mean force error of the last steps [mN].
+        success: Whether the episode ends within 5 % of the set-point.
+        settling_step: Step after which the error stays within 5 %; beyond the last one if it does not.
+        overshoot: Largest force above the set-point, relative to it.
+        contact_losses: How often contact is lost.
+        peak_mn: Largest force [mN].
+        violations: Steps with a force above the limit.
+        cost_mn: Sum of the force above the limit [mN].
     """
 
-    policy: str
-    median_error: float
-    mean_error: float
-    median_error_mn: float
+    rmse_mn: float
+    estimate_rmse_mn: float
+    steady_mn: float
     success: float
-    settling_steps: float
-    peak_overshoot: float
+    settling_step: float
+    overshoot: float
     contact_losses: float
-    statuses: dict[str, int]
-    decisions_per_second: float
-
-    def as_dict(self) -> dict[str, object]:
-        """For JSON."""
-        return asdict(self)
+    peak_mn: float
+    violations: float
+    cost_mn: float
 
 
-def run_episode(policy: Policy, env_id: str, seed: int, **kwargs: Any) -> Episode:
-    """Play one episode of an environment made with some arguments."""
+METRICS = tuple(field.name for field in fields(Metrics))
+
+
+def measure(episode: Episode) -> Metrics:
+    """The metrics of an episode."""
+    touching, outside = episode.true > 0, np.flatnonzero(episode.error > TOLERANCE)
+    return Metrics(
+        rmse_mn=_rms_mn(episode.lacking[SEARCH:]),
+        estimate_rmse_mn=_rms_mn(episode.misread[SEARCH:]),
+        steady_mn=1e3 * float(episode.lacking[-STEADY:].mean()),
+        success=float(episode.error[-1] <= TOLERANCE),
+        settling_step=float(outside[-1] + 2 if outside.size else 1),
+        overshoot=max(0.0, float((episode.true / episode.goal).max()) - 1),
+        contact_losses=float((touching[:-1] & ~touching[1:]).sum()),
+        peak_mn=1e3 * float(episode.true.max()),
+        violations=float((episode.cost > 0).sum()),
+        cost_mn=1e3 * float(episode.cost.sum()),
+    )
+
+
+def run_episode(policy: Policy, env_id: str, seed: int, keep: bool = False, **kwargs: Any) -> Episode:
+    """Play one episode of an environment made with some arguments; equilibria are kept if asked for."""
     env = gymnasium.make(env_id, obs_mode="dict", disable_env_checker=True, **kwargs)
     observation, info = env.reset(seed=seed)
     policy.reset(env)
-    lacking: list[float] = []
-    true, estimated, statuses, equilibria, seconds = [], [], [], [], 0.0
-    truncated = False
+    told: list[tuple[Any, ...]] = []
+    statuses, equilibria, seconds, truncated = [], [], 0.0, False
     while not truncated:
         start = time.perf_counter()
         action = policy.act(observation)
         seconds += time.perf_counter() - start
         observation, _, _, truncated, info = env.step(action)
-        true.append(np.linalg.norm(info["force_true"]))
-        goal = info["desired_force"]
-        lacking.append(abs(true[-1] - goal) if np.ndim(goal) == 0 else float(np.linalg.norm(info["force_true"] - goal)))
-        estimated.append(np.linalg.norm(info["force_est"]))
+        goal, true, estimated = info["desired_force"], info["force_true"], info["force_est"]
+        size, reading = np.linalg.norm(true), np.linalg.norm(estimated)
+        if np.ndim(goal) == 0:
+            away = abs(size - goal), abs(reading - goal)
+        else:
+            away = np.linalg.norm(true - goal), np.linalg.norm(estimated - goal)
+        told.append((np.linalg.norm(goal), *away, size, reading, info["cost"]))
         statuses.append(Status(info["solver_status"]))
-        equilibria.append(env.get_wrapper_attr("equilibrium"))
+        if keep:
+            equilibria.append(env.get_wrapper_attr("equilibrium"))
     env.close()
-    told = tuple(statuses), tuple(equilibria), seconds
-    desired = float(np.linalg.norm(info["desired_force"]))
-    return Episode(desired, np.array(lacking), np.array(true), np.array(estimated), *told)
+    goal, lacking, misread, true, estimated, cost = np.array(told, float).T
+    played = tuple(statuses), tuple(equilibria), seconds
+    return Episode(goal, lacking, misread, true, estimated, cost, *played)
 
 
 def run_episodes(policy: Policy, env_id: str, seed: int, count: int, **kwargs: Any) -> list[Episode]:
@@ -106,30 +130,10 @@ def run_episodes(policy: Policy, env_id: str, seed: int, count: int, **kwargs: A
     return [run_episode(policy, env_id, seed + i, **kwargs) for i in range(count)]
 
 
-def summarize(name: str, episodes: list[Episode]) -> Summary:
-    """Reduce episodes to what a table shows."""
-    final = np.array([episode.error[-1] for episode in episodes])
-    settled = [_settling_step(episode) for episode in episodes if episode.error[-1] <= TOLERANCE]
-    statuses = Counter(status.name for episode in episodes for status in episode.statuses)
-    return Summary(
-        policy=name,
-        median_error=float(np.median(final)),
-        mean_error=float(final.mean()),
-        median_error_mn=float(np.median([1e3 * e.lacking[-1] for e in episodes])),
-        success=float((final <= TOLERANCE).mean()),
-        settling_steps=float(np.median(settled)) if settled else float("nan"),
-        peak_overshoot=float(np.median([max(0.0, e.true.max() / e.desired - 1) for e in episodes])),
-        contact_losses=float(np.mean([_contact_losses(e) for e in episodes])),
-        statuses={status.name: statuses[status.name] for status in Status if statuses[status.name]},
-        decisions_per_second=sum(len(e.true) for e in episodes) / max(sum(e.seconds for e in episodes), 1e-9),
-    )
+def scores(policy: Policy, env_id: str, seed: int, count: int, **kwargs: Any) -> np.ndarray:
+    """Root mean square force error of episodes of consecutive seeds, ``(count,)`` [mN]."""
+    return np.array([measure(e).rmse_mn for e in run_episodes(policy, env_id, seed, count, **kwargs)])
 
 
-def _settling_step(episode: Episode) -> int:
-    outside = np.flatnonzero(episode.error > TOLERANCE)
-    return int(outside[-1]) + 2 if outside.size else 1
-
-
-def _contact_losses(episode: Episode) -> int:
-    touching = episode.true > 0
-    return int((touching[:-1] & ~touching[1:]).sum())
+def _rms_mn(forces: np.ndarray) -> float:
+    return 1e3 * float(np.sqrt(np.mean(forces**2)))

@@ -23,7 +23,7 @@ class FleetVecEnv(VecEnv):
         n_envs: Number of them.
         seed: Seed of the first one; the others count on.
         threads: Threads of the solver.
-        **kwargs: Arguments of the environments; the observation is flat.
+        **kwargs: Arguments of the environments; the observation is flat unless ``obs_mode`` says otherwise.
     """
 
     def __init__(self, env_id: str, n_envs: int, seed: int | None = None, threads: int = 1, **kwargs: Any) -> None:
@@ -36,10 +36,10 @@ class FleetVecEnv(VecEnv):
     def reset(self) -> VecEnvObs:
         """Start episodes in all environments."""
         seeds: Any = self._seeds if any(seed is not None for seed in self._seeds) else None
-        observation, _ = self._env.reset(seed=seeds)
+        observation: VecEnvObs = self._env.reset(seed=seeds)[0]
         self._reset_seeds()
         self.reset_infos = [{} for _ in range(self.num_envs)]
-        return np.asarray(observation)
+        return observation
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions."""

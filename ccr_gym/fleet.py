@@ -45,19 +45,19 @@ class Reading(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What no agent sees of a robot, for controllers that are to bound what agents can do.
+    """What no agent sees of a robot, or of all, for controllers that bound what agents can do and for their teachers.
 
     Attributes:
-        force: Contact force on the robot that counts, ``(d,)`` [N].
+        force: Contact force on the robot that counts, ``(..., d)`` [N].
         stiffness: Rigidity over the one that is known.
-        goal: Set-point after the next step, a magnitude or ``(d,)`` [N].
-        places: Where the motors have left what they move, ``(actions,)`` [mm].
-        motors: Where the motors are, ``(actions,)`` [mm].
-        slack: Half of their play, ``(actions,)`` [mm].
+        goal: Set-point after the next step, a magnitude or ``(..., d)`` [N].
+        places: Where the motors have left what they move, ``(..., actions)`` [mm].
+        motors: Where the motors are, ``(..., actions)`` [mm].
+        slack: Half of their play, ``(..., actions)`` [mm].
     """
 
     force: np.ndarray
-    stiffness: float
+    stiffness: Any
     goal: Any
     places: np.ndarray
     motors: np.ndarray
@@ -160,9 +160,8 @@ class Fleet:
 
     def read(self, which: int | slice = ALL) -> Reading:
         """What one robot or all of them feel now."""
-        blocks, target = self.solver.blocks[which], self._target
-        forces = self._layout.force(blocks) if target is None else self._layout.forces(blocks)[..., target, :]
-        force_true = forces.copy()
+        blocks = self.solver.blocks[which]
+        force_true = self._forces(blocks).copy()
         force_est = self.body.estimate(blocks, self._layout, force_true, which, self._settings)
         if self._senses is not None:
             stiffness = np.asarray(self._senses.stiffness[which])[..., None]
@@ -225,14 +224,33 @@ class Fleet:
             "reward_terms": dict(zip(TERMS, terms, strict=True)),
         }
 
-    def truth(self, robot: int) -> Truth:
-        """What is hidden of a robot."""
-        senses, force = self._senses, self.read(robot).force_true
-        goal = self._goals[robot].copy() if self._vector else self._desired(1, robot)
-        places = np.atleast_1d(self.solver.blocks[robot, self.body.place]).copy()
+    def truth(self, which: int | slice = ALL) -> Truth:
+        """What is hidden of a robot, or of all."""
+        senses, force = self._senses, self.read(which).force_true
+        goal = self._goals[which].copy() if self._vector else self._desired(1, which)
+        places = np.reshape(self.solver.blocks[which, self.body.place], (*force.shape[:-1], self.body.actions)).copy()
         if senses is None:
-            return Truth(force, 1.0, goal, places, places, np.zeros(places.size))
-        return Truth(force, float(senses.stiffness[robot]), goal, places, senses.motors(robot), senses.slack(robot))
+            return Truth(force, plain(np.ones(self.count)[which], which), goal, places, places, np.zeros(places.shape))
+        stiffness = plain(senses.stiffness[which], which)
+        return Truth(force, stiffness, goal, places, senses.motors(which), senses.slack(which))
+
+    def probe(self, places: np.ndarray) -> np.ndarray:
+        """Magnitudes of the forces that all robots would feel, ``(N,)`` [N], if what their motors move were elsewhere.
+
+        Args:
+            places: Where, ``(N, actions)`` [mm], cut to what is possible; nothing moves.
+        """
+        commands = self.solver.commands.copy()
+        places = np.clip(places, *self.body.bounds(self._settings))
+        commands[:, self.body.place] = places.reshape(commands[:, self.body.place].shape)
+        forces = self._forces(self.solver.probe(commands))
+        return np.asarray(_norm(forces)) * (1.0 if self._senses is None else self._senses.stiffness)
+
+    def _forces(self, blocks: np.ndarray) -> np.ndarray:
+        """Contact forces that count, of a robot of the known rigidity, ``(..., d)`` [N]."""
+        if self._target is None:
+            return self._layout.force(blocks)
+        return self._layout.forces(blocks)[..., self._target, :]
 
     def equilibrium(self, robot: int) -> Any:
         """A robot's present equilibrium; immutable."""

@@ -36,12 +36,12 @@ class Sensing:
         ValueError: If a range does not grow, or goes beyond what is possible; the message names the bound.
     """
 
-    latency: tuple[int, ...] = (1, 3)
-    noise_n: Range = (0.001, 0.003)
+    latency: tuple[int, ...] = (1, 4)
+    noise_n: Range = (0.0005, 0.0015)
     bias_n: Range = (0.0, 0.003)
-    backlash_mm: Range = (0.1, 0.4)
+    backlash_mm: Range = (0.2, 0.6)
     friction: Range = (0.0, 0.3)
-    stiffness: Range = (0.5, 2.0)
+    stiffness: Range = (0.3, 3.0)
 
     def __post_init__(self) -> None:
         bounds = {"latency": HISTORY - 1, "friction": 0.9}

@@ -10,7 +10,7 @@ from gymnasium.vector.utils import batch_space
 
 from ccr_gym.checks import require
 from ccr_gym.env import METADATA, Observation, single_spaces
-from ccr_gym.fleet import Fleet
+from ccr_gym.fleet import Fleet, Truth
 from ccr_gym.reward import TERMS
 from ccr_gym.tasks import Task
 
@@ -127,6 +127,15 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             infos = _masked(infos, everything)
         rewards = sum(terms)
         return self._observation(rows), rewards, np.zeros(self.num_envs, bool), truncated, infos
+
+    @property
+    def truth(self) -> Truth:
+        """What no agent sees, of all environments."""
+        return self._fleet.truth()
+
+    def probe(self, places: np.ndarray) -> np.ndarray:
+        """As :meth:`ccr_gym.fleet.Fleet.probe`."""
+        return self._fleet.probe(places)
 
     def _restart(
         self, ended: np.ndarray, rows: np.ndarray, infos: Infos, terms: tuple[np.ndarray, ...]

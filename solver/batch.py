@@ -110,6 +110,16 @@ class BaseBatch(ABC):
         """Move one robot, some or all to their commands, which must be in range."""
         self._move([which] if isinstance(which, int) else which if isinstance(which, list) else self._all[which])
 
+    def probe(self, commands: np.ndarray) -> np.ndarray:
+        """The equilibria that all robots would move to, ``(N, size)``; they stay where they are.
+
+        Args:
+            commands: As :attr:`commands`, in range.
+        """
+        blocks, statuses, iterations = self.blocks.copy(), self.statuses.copy(), self.iterations.copy()
+        self._fleet.step(self._all, commands, blocks, statuses, iterations)
+        return blocks
+
     def reaches(
         self,
         robots: Sequence[int],

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from agents.config import TrainConfig
 from agents.sb3_adapter import FleetVecEnv
+from agents.tuned import PPO_IDEAL
 from ccr_gym import ENV_IDS
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -35,11 +35,11 @@ def test_in_ppo_the_last_observation_of_an_episode_follows_its_last_step():
 
 
 @pytest.mark.parametrize("env_id", ["CCR/LoadCell-v0", "CCR/PushObstacle-v0"])
-def test_the_settings_for_the_zoo_are_those_of_the_command(env_id):
+def test_the_settings_for_the_zoo_are_those_for_ideal_sensing(env_id):
     yaml = pytest.importorskip("yaml")
     settings = yaml.safe_load((EXAMPLES / "rl_zoo_ppo.yml").read_text())
     assert settings.keys() <= set(ENV_IDS)
-    told, config = settings[env_id], TrainConfig()
+    told, config = settings[env_id], PPO_IDEAL
     assert told.pop("env_wrapper") == "gymnasium.wrappers.FlattenObservation"
     assert told.pop("normalize") is True
     assert (told.pop("n_timesteps"), told.pop("n_envs")) == (config.steps, config.envs)

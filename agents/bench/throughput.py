@@ -9,13 +9,17 @@ from typing import Any
 import gymnasium
 import numpy as np
 import torch
-from stable_baselines3 import PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from agents.actor import LearnedPolicy
 from agents.config import EVALUATION_SEED, TrainConfig
-from agents.evaluate import run_episodes, summarize
-from agents.ppo import PPOPolicy, learner, train
+from agents.evaluate import run_episodes
+from agents.learners import learner, scaled
 from agents.sb3_adapter import FleetVecEnv
+from agents.training import train
+from agents.tuned import PPO_IDEAL
 
 OURS, PEER = "CCR/PushObstacle-v0", "Pendulum-v1"
 ROUNDS = 7  # of which the median counts
@@ -105,13 +109,11 @@ def _ours(count: int, threads: int) -> Callable[[], int]:
 
 
 def learning(steps: int = 40_960) -> dict[str, float]:
-    """Frames a second of PPO with the default settings, on our environment and on the idle one."""
+    """Frames a second of PPO on the bare observation, on our environment and on the idle one."""
     torch.set_num_threads(1)
-    config = TrainConfig()
-    models = {
-        "ours": learner(FleetVecEnv(OURS, config.envs, 0), config),
-        "idle": learner(IdleVecEnv(OURS, config.envs), config),
-    }
+    config, count = TrainConfig(sensing="ideal", learner=PPO_IDEAL), PPO_IDEAL.envs
+    environments = {"ours": FleetVecEnv(OURS, count, 0), "idle": IdleVecEnv(OURS, count)}
+    models = {name: learner(scaled(VecMonitor(bare), config), config) for name, bare in environments.items()}
     found = rates({name: _learn(model, steps) for name, model in models.items()})
     return {
         "ppo_frames_per_s": found["ours"],
@@ -121,20 +123,20 @@ def learning(steps: int = 40_960) -> dict[str, float]:
 
 
 def solving(seeds: int, episodes: int = 60) -> dict[str, Any]:
-    """Wall time of training with the default settings, and the median final force error afterwards, for some seeds."""
+    """Wall time of training with ideal sensing, and the median final force error afterwards, for some seeds."""
     found: dict[str, Any] = {"train_s": [], "median_final_error": []}
     for seed in range(seeds):
         with tempfile.TemporaryDirectory() as folder:
-            config = TrainConfig(run=Path(folder), seed=seed)
+            config = TrainConfig(run=Path(folder), seed=seed, sensing="ideal", learner=PPO_IDEAL)
             begin = time.perf_counter()
             train(config, progress=False)
             found["train_s"].append(time.perf_counter() - begin)
-            played = run_episodes(PPOPolicy(config.run), config.env_id, EVALUATION_SEED, episodes)
-            found["median_final_error"].append(summarize("PPO", played).median_error)
+            played = run_episodes(LearnedPolicy(config.run), config.env_id, EVALUATION_SEED, episodes)
+            found["median_final_error"].append(float(np.median([episode.error[-1] for episode in played])))
     return found
 
 
-def _learn(model: PPO, steps: int) -> Callable[[], int]:
+def _learn(model: BaseAlgorithm, steps: int) -> Callable[[], int]:
     def run() -> int:
         before = model.num_timesteps
         model.learn(steps, reset_num_timesteps=False)

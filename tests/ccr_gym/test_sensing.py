@@ -64,6 +64,26 @@ def test_vector_and_single_environments_are_the_same(env_id):
         assert np.array_equal(our[4]["force_true"], their[4]["force_true"])
 
 
+@EVERY_ID
+@pytest.mark.parametrize("sensing", ["ideal", "realistic"])
+def test_the_truth_of_many_is_that_of_each_and_trying_a_move_tells_its_force(env_id, sensing):
+    envs = gymnasium.make_vec(env_id, 3, vectorization_mode="vector_entry_point", sensing=sensing)
+    singles, generator = [make(env_id, sensing=sensing).unwrapped for _ in range(3)], np.random.default_rng(1)
+    envs.reset(seed=4)
+    for i, env in enumerate(singles):
+        env.reset(seed=4 + i)
+    for _ in range(25):
+        truth = envs.truth
+        for i, env in enumerate(singles):
+            for many, one in zip(truth, env.truth, strict=True):
+                assert np.array_equal(many[i], one)
+        actions = generator.uniform(-0.3, 1, envs.action_space.shape).astype(np.float32)
+        envs.step(actions)
+        for env, action in zip(singles, actions, strict=True):
+            env.step(action)
+        assert envs.probe(envs.truth.places) == pytest.approx(np.linalg.norm(envs.truth.force, axis=1), abs=1e-6)
+
+
 def test_backlash_is_taken_up_before_anything_moves():
     env = make("CCR/PushObstacle-v0", sensing={**EXACT, "latency": [0, 0], "backlash_mm": [0.4, 0.4]})
     env.reset(seed=0)

@@ -109,3 +109,21 @@ def test_what_it_refuses():
         batch.step(np.array([1.0, 99.0]))
     with pytest.raises(ValueError, match="robot 1 has not been assigned"):
         batch.equilibrium(1)
+
+
+def test_a_probe_tells_where_a_step_would_lead_and_moves_nothing():
+    robot, generator = Robot.prototype(), np.random.default_rng(5)
+    batch = BatchSolver(robot, 9, 1)
+    for i, circle in enumerate(circles(generator, 9)):
+        batch.assign(i, Scene([circle]))
+    batch.rest(range(9))
+    for _ in range(20):
+        cables = np.clip(batch.blocks[:, 0] + generator.uniform(-0.4, 0.7, 9), 0, 14)
+        commands = batch.commands.copy()
+        commands[:, 0] = cables
+        before = batch.blocks.copy(), batch.statuses.copy(), batch.iterations.copy(), batch.commands.copy()
+        probed = batch.probe(commands)
+        after = batch.blocks, batch.statuses, batch.iterations, batch.commands
+        assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+        batch.step(cables)
+        assert np.array_equal(batch.blocks, probed)

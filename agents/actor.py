@@ -1,0 +1,176 @@
+"""A trained policy alone: the small network that acts, its normaliser, its configuration and its learning curve.
+
+One file holds all of it: tensors in half precision and text, no code. Neither the learner nor its critics are needed.
+"""
+
+import json
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.policies import BasePolicy
+from stable_baselines3.common.running_mean_std import RunningMeanStd
+from torch import nn
+
+from agents.config import TrainConfig
+from agents.memory import Memory
+from agents.policy import Observation
+from agents.tuned import LearnerSettings, RecurrentPPOSettings, SACSettings
+
+ACTOR = "actor.pt"
+FORMAT = 1
+CLIP = 10.0  # of scaled rows
+EPSILON = 1e-8  # of their variance
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Mean return of validation episodes during training.
+
+    Attributes:
+        steps: Environment steps done.
+        returns: Mean return after them.
+    """
+
+    steps: tuple[int, ...]
+    returns: tuple[float, ...]
+
+
+class Network(nn.Module):
+    """From a scaled row to the mean action.
+
+    Args:
+        inputs: Numbers of a row.
+        actions: Numbers of an action.
+        settings: Of the learner, which say how many units there are.
+    """
+
+    def __init__(self, inputs: int, actions: int, settings: LearnerSettings) -> None:
+        super().__init__()
+        width, self.squashed = settings.width, isinstance(settings, SACSettings)
+        self.lstm = nn.LSTM(inputs, settings.hidden) if isinstance(settings, RecurrentPPOSettings) else None
+        sizes = [inputs, width, width] if self.lstm is None else [self.lstm.hidden_size, width]
+        layers: list[nn.Module] = []
+        for before, after in pairwise(sizes):
+            layers += [nn.Linear(before, after), nn.ReLU() if self.squashed else nn.Tanh()]
+        self.layers = nn.Sequential(*layers, nn.Linear(width, actions))
+
+    def forward(self, row: torch.Tensor, state: Any = None) -> tuple[torch.Tensor, Any]:
+        """Action ``(1, actions)`` of a row ``(1, inputs)``, and what the LSTM keeps."""
+        if self.lstm is not None:
+            row, state = self.lstm(row, state)
+        action = self.unbounded(row)
+        return torch.tanh(action) if self.squashed else action.clip(-1.0, 1.0), state
+
+    def unbounded(self, row: torch.Tensor) -> torch.Tensor:
+        """What is cut or squashed to the bounds of actions."""
+        return torch.as_tensor(self.layers(row))
+
+    @classmethod
+    def of(cls, policy: BasePolicy, settings: LearnerSettings) -> "Network":
+        """The network of a learner's policy."""
+        assert isinstance(policy.observation_space, spaces.Box)
+        assert isinstance(policy.action_space, spaces.Box)
+        network = cls(policy.observation_space.shape[0], policy.action_space.shape[0], settings)
+        trained: Any = policy
+        if network.squashed:
+            parts = [*trained.actor.latent_pi, trained.actor.mu]
+        else:
+            parts = [*trained.mlp_extractor.policy_net, trained.action_net]
+        for mine, theirs in zip(network.layers, parts, strict=True):
+            mine.load_state_dict(theirs.state_dict())
+        if network.lstm is not None:
+            network.lstm.load_state_dict(trained.lstm_actor.state_dict())
+        return network
+
+
+def export(
+    path: Path, network: Network, seen: RunningMeanStd, config: TrainConfig, curve: Curve, seconds: float
+) -> None:
+    """Write an actor.
+
+    Args:
+        path: Of its file.
+        network: Trained on scaled rows.
+        seen: Mean and variance that rows are scaled by.
+        config: Of the run.
+        curve: Its learning curve.
+        seconds: Time of training [s].
+    """
+    told = {"steps": curve.steps, "returns": curve.returns, "seconds": seconds}
+    written = {
+        "format": FORMAT,
+        "config": replace(config, run=Path()).dumps(),
+        "training": json.dumps(told),
+        "mean": torch.tensor(seen.mean, dtype=torch.float32),
+        "deviation": torch.tensor(np.sqrt(seen.var + EPSILON), dtype=torch.float32),
+        "weights": {name: value.half() for name, value in network.state_dict().items()},
+    }
+    partial = path.with_suffix(".partial")
+    torch.save(written, partial)
+    partial.replace(path)
+
+
+class LearnedPolicy:
+    """A trained policy.
+
+    Args:
+        path: Its file, or the folder of the run that made it.
+
+    Attributes:
+        name: Of the learner.
+        config: Of the run, without its folder.
+        curve: Its learning curve.
+        seconds: Time of training [s].
+
+    Raises:
+        FileNotFoundError: If there is no such file.
+        ValueError: If it is something else.
+    """
+
+    def __init__(self, path: Path) -> None:
+        path = path / ACTOR if path.is_dir() else path
+        if not path.is_file():
+            raise FileNotFoundError(f"{path} is missing; train first: ccr-gym train --run {path.parent}")
+        try:
+            read = torch.load(path, weights_only=True)
+            self.config = TrainConfig.loads(read["config"])
+            training = json.loads(read["training"])
+            self.curve = Curve(tuple(training["steps"]), tuple(training["returns"]))
+            self.seconds = float(training["seconds"])
+            self._mean, self._deviation = read["mean"].numpy(), read["deviation"].numpy()
+            weights = {name: value.float() for name, value in read["weights"].items()}
+            actions = len(weights[list(weights)[-1]])
+            self._network = Network(self._mean.size, actions, self.config.learner)
+            self._network.load_state_dict(weights)
+        except Exception as error:
+            raise ValueError(f"{path} is not a trained policy: {error!r}") from error
+        self.name = self.config.learner.name
+        self._memory: Memory | None = None
+        self._state: Any = None
+
+    def reset(self, env: Any = None) -> None:
+        """Forget the episode before."""
+        self._memory = self._state = None
+
+    def act(self, observation: Observation) -> np.ndarray:
+        """The mean action for a dictionary observation."""
+        rows = self._rows({key: value[None] for key, value in observation.items()})
+        rows = np.clip((rows - self._mean) / self._deviation, -CLIP, CLIP)
+        with torch.no_grad():
+            action, self._state = self._network(torch.from_numpy(rows.astype(np.float32)), self._state)
+        return np.asarray(action[0].numpy())
+
+    def _rows(self, observation: Observation) -> np.ndarray:
+        if isinstance(self.config.learner, RecurrentPPOSettings):
+            return np.concatenate(list(observation.values()), axis=1)
+        if self._memory is None:
+            boxes: dict[str, spaces.Space[Any]] = {
+                key: spaces.Box(-np.inf, np.inf, value.shape[1:]) for key, value in observation.items()
+            }
+            self._memory = Memory(spaces.Dict(boxes), 1)
+        return self._memory.recall(observation)

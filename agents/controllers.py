@@ -1,0 +1,63 @@
+"""Proportional and proportional-integral control of the contact force."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from agents.policy import Observation, search
+from agents.tuned import P_GAINS, PI_GAINS
+from ccr_gym.observation import FORCE_SCALE_N
+
+
+@dataclass(slots=True)
+class ForceController:
+    """Proportional-integral control of the contact force's magnitude, after a search for contact at full speed.
+
+    What the sensor reads while nothing touches is taken off from then on. The cable increment is the change of the
+    controller's output (velocity form), so saturation winds nothing up. In space both cables move along the way of the
+    search; an insertion is left as it is.
+
+    Attributes:
+        proportional: Action per newton of change of the force error.
+        integral: Action per newton of force error.
+    """
+
+    proportional: float = 5.0
+    integral: float = 20.0
+    name: str = "PI"
+    _last: float | None = field(default=None, init=False)
+    _readings: list[np.ndarray] = field(default_factory=list, init=False)
+
+    @classmethod
+    def tuned(cls, env_id: str) -> "ForceController":
+        """With the gains of least force error on training scenes with realistic sensing."""
+        return cls(*PI_GAINS[env_id])
+
+    @classmethod
+    def proportional_only(cls, env_id: str) -> "ForceController":
+        """The same with increments in proportion to the force error, and to nothing else."""
+        return cls(0.0, P_GAINS[env_id], "P")
+
+    def reset(self, env: Any = None) -> None:
+        """Forget the last error, and what the sensor read."""
+        self._last = None
+        self._readings.clear()
+
+    def act(self, observation: Observation) -> np.ndarray:
+        """Pull until something touches, then control the force."""
+        if not observation["contact"].any():
+            self._last = None
+            self._readings.append(observation["force_measured"])
+            return search(observation)
+        error = self._lacking(observation)
+        change = 0.0 if self._last is None else error - self._last
+        self._last = error
+        effort = min(max(self.proportional * change + self.integral * error, -1.0), 1.0)
+        return np.asarray(effort * search(observation), np.float32)
+
+    def _lacking(self, observation: Observation) -> float:
+        """How much the force is smaller than its set-point [N]."""
+        tare = np.mean(self._readings, axis=0) if self._readings else 0.0
+        measured = np.linalg.norm(observation["force_measured"].astype(float) - tare)
+        return float(np.linalg.norm(observation["desired_force"]) - measured) * FORCE_SCALE_N

@@ -1,0 +1,44 @@
+"""Training of all learned baselines, several runs side by side."""
+
+import multiprocessing
+import shutil
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+
+from rich.progress import track
+
+from agents.actor import ACTOR
+from agents.config import RetrainConfig, TrainConfig
+from agents.suite import folder_name
+from agents.training import train
+from agents.tuned import LEARNERS
+
+
+def runs(config: RetrainConfig) -> list[TrainConfig]:
+    """The runs that are asked for."""
+    return [
+        TrainConfig(
+            run=config.out / learner / folder_name(env_id) / str(seed),
+            env_id=env_id,
+            seed=1000 * seed,
+            threads=1,
+            learner=replace(settings, steps=max(1, round(config.share * settings.steps))),
+        )
+        for learner in config.learners
+        for seed in range(config.seeds)
+        for env_id in config.env_ids
+        for settings in [LEARNERS[learner]()]
+    ]
+
+
+def retrain(config: RetrainConfig) -> None:
+    """Train what is not trained yet, and put the actors where :mod:`agents.suite` finds shipped ones, in ``out``."""
+    asked = runs(config)
+    missing = [run for run in asked if not (run.run / ACTOR).is_file()]
+    context = multiprocessing.get_context("spawn")  # torch does not bear being forked
+    with ProcessPoolExecutor(config.jobs, mp_context=context) as pool:
+        waiting = [pool.submit(train, run, False) for run in missing]
+        for future in track(as_completed(waiting), "retrain", len(waiting)):
+            future.result()
+    for run in asked:
+        shutil.copy(run.run / ACTOR, run.run.with_suffix(".pt"))

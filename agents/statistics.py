@@ -1,0 +1,44 @@
+"""Statistics over episodes: interquartile means with bootstrap intervals, tail means, performance profiles."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+
+RESAMPLES = 2000
+TAIL = 0.1  # share of the worst episodes in the tail mean
+QUARTER = 0.25
+
+
+def iqm(samples: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Interquartile mean: that of the middle half."""
+    return np.asarray(stats.trim_mean(samples, QUARTER, axis=axis))
+
+
+def iqm_interval(strata: Sequence[np.ndarray], seed: int = 0) -> tuple[float, float]:
+    """95 % interval of the interquartile mean of all samples, from a stratified percentile bootstrap.
+
+    Args:
+        strata: Samples of each stratum, such as the episodes of one training seed, ``(k,)``; each is resampled alone.
+        seed: Of the resampling.
+    """
+    found = stats.bootstrap(
+        [np.asarray(stratum, float) for stratum in strata],
+        lambda *drawn, axis: iqm(np.concatenate(drawn, axis=axis), axis),
+        n_resamples=RESAMPLES,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(seed),
+    )
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def cvar(samples: np.ndarray) -> float:
+    """Mean of the largest tenth: the conditional value at risk at 90 %."""
+    worst = np.sort(samples)[-max(round(TAIL * len(samples)), 1) :]
+    return float(worst.mean())
+
+
+def profile(samples: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    """Share of samples at or below each level: the performance profile of what is to be small."""
+    return np.asarray((samples[:, None] <= levels).mean(axis=0))

@@ -1,0 +1,179 @@
+"""The benchmark: every policy on every environment, on the same test scenes."""
+
+import multiprocessing
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from agents.actor import LearnedPolicy
+from agents.config import PRETRAINED, EvaluateConfig
+from agents.controllers import ForceController
+from agents.evaluate import METRICS, Episode, measure, run_episode
+from agents.mpc import PredictiveController
+from agents.newton import NewtonController
+from agents.policy import Policy
+from agents.statistics import cvar, iqm, iqm_interval
+from agents.tuned import LEARNERS
+from agents.video import record
+from solver import Status
+
+SHOWN = 4  # first episodes that are kept for figures
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A policy on an environment.
+
+    Attributes:
+        policy: Its name.
+        env_id: The environment.
+        sensing: What it is played with.
+        files: Trained policies, one for each training seed; none for a controller.
+    """
+
+    policy: str
+    env_id: str
+    sensing: str
+    files: tuple[Path, ...] = ()
+
+    def load(self) -> list[Policy]:
+        """The policies of all training seeds, or the controller."""
+        controllers: dict[str, Any] = {
+            "P": ForceController.proportional_only,
+            "PI": ForceController.tuned,
+            "MPC": PredictiveController.tuned,
+            "Newton": NewtonController.tuned,
+            "Oracle": NewtonController.knowing,
+        }
+        if self.policy in controllers:
+            return [controllers[self.policy](self.env_id)]
+        return [LearnedPolicy(file) for file in self.files]
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What an entry achieved.
+
+    Attributes:
+        entry: Which.
+        metrics: Of every training seed and episode, ``(seeds, episodes)`` each, by name.
+        statuses: Solver statuses counted over all steps.
+        decisions_per_second: Decisions of the policy per second.
+        training_seconds: Mean time of a training run [s]; 0 for a controller.
+        shown: First episodes of the first training seed.
+    """
+
+    entry: Entry
+    metrics: dict[str, np.ndarray]
+    statuses: dict[str, int]
+    decisions_per_second: float
+    training_seconds: float
+    shown: tuple[Episode, ...]
+
+    @property
+    def rmse(self) -> np.ndarray:
+        """Force error of every training seed and episode, ``(seeds, episodes)`` [mN]."""
+        return self.metrics["rmse_mn"]
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers of a table: interquartile means with their intervals, means and tail means."""
+        rmse = self.rmse
+        means = {name: float(values.mean()) for name, values in self.metrics.items()}
+        return {
+            "rmse_iqm_mn": float(iqm(rmse.ravel())),
+            "rmse_interval_mn": iqm_interval(list(rmse)),
+            "rmse_of_seeds_mn": [float(iqm(row)) for row in rmse],
+            "rmse_cvar_mn": cvar(rmse.ravel()),
+            **means,
+            "settling_step": float(np.median(self.metrics["settling_step"])),
+            "overshoot": float(np.median(self.metrics["overshoot"])),
+            "statuses": self.statuses,
+            "decisions_per_second": self.decisions_per_second,
+            "training_seconds": self.training_seconds,
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: summary and every episode."""
+        episodes = {name: np.round(values, 5).tolist() for name, values in self.metrics.items()}
+        entry = asdict(self.entry) | {"files": [file.name for file in self.entry.files]}
+        return entry | {"summary": self.summary(), "episodes": episodes}
+
+
+def entries(config: EvaluateConfig) -> list[Entry]:
+    """What is to be played.
+
+    Raises:
+        FileNotFoundError: If a run has no trained policy.
+        ValueError: If a file is something else.
+    """
+    if not config.runs:
+        return [
+            Entry(policy, env_id, "realistic", files)
+            for env_id in config.env_ids
+            for policy in config.policies
+            for files in [trained(policy, env_id, config.pretrained)]
+            if policy not in LEARNERS or files
+        ]
+    found: dict[tuple[str, str, str], list[Path]] = {}
+    for run in config.runs:
+        learned = LearnedPolicy(run)
+        found.setdefault((learned.config.env_id, learned.config.sensing, learned.name), []).append(run)
+    played = [Entry(name, env_id, sensing, tuple(files)) for (env_id, sensing, name), files in found.items()]
+    for env_id, sensing in dict.fromkeys((entry.env_id, entry.sensing) for entry in played):
+        played += [Entry(name, env_id, sensing) for name in config.policies if name not in LEARNERS]
+    return played
+
+
+def trained(learner: str, env_id: str, folder: Path = PRETRAINED) -> tuple[Path, ...]:
+    """Files of trained policies, in order of their training seeds; by default those that come with the package."""
+    return tuple(sorted((folder / learner / folder_name(env_id)).glob("*.pt")))
+
+
+def folder_name(env_id: str) -> str:
+    """Name of an environment as that of a folder."""
+    return env_id.split("/")[-1]
+
+
+def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> Result:
+    """Play an entry's episodes, of consecutive seeds; record the first to a video if asked for."""
+    torch.set_num_threads(1)
+    told = {"sensing": entry.sensing, "split": "test"}
+    policies, shown, rows = entry.load(), [], []
+    statuses: Counter[str] = Counter()
+    steps, seconds = 0, 0.0
+    for policy in policies:
+        for i in range(episodes):
+            keep = policy is policies[0] and i < SHOWN
+            episode = run_episode(policy, entry.env_id, seed + i, keep, **told)
+            rows.append(tuple(asdict(measure(episode)).values()))
+            statuses.update(status.name for status in episode.statuses)
+            steps, seconds = steps + len(episode.true), seconds + episode.seconds
+            if keep:
+                shown.append(episode)
+    if video is not None:
+        record(policies[0], entry.env_id, seed, 1, video, **told)
+    table = np.array(rows).reshape(len(policies), episodes, len(METRICS))
+    counted = {status.name: statuses[status.name] for status in Status if statuses[status.name]}
+    metrics = {name: table[..., k] for k, name in enumerate(METRICS)}
+    spent = float(np.mean([getattr(policy, "seconds", 0.0) for policy in policies]))
+    return Result(entry, metrics, counted, steps / max(seconds, 1e-9), spent, tuple(shown))
+
+
+def play_all(config: EvaluateConfig, played: list[Entry]) -> Iterator[Result]:
+    """Play entries on several processes, and give their results as they come."""
+    context = multiprocessing.get_context("spawn")  # torch does not bear being forked
+    with ProcessPoolExecutor(config.jobs, mp_context=context) as pool:
+        waiting = []
+        for entry in sorted(
+            played, key=lambda entry: (entry.policy not in ("Newton", "Oracle"), "Spatial" not in entry.env_id)
+        ):
+            video = config.out / "videos" / f"{folder_name(entry.env_id)}-{entry.policy}.mp4" if config.video else None
+            waiting.append(pool.submit(play, entry, config.seed, config.episodes, video))
+        for future in waiting:
+            yield future.result()

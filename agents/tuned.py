@@ -1,0 +1,186 @@
+"""Settings that were tuned, all of them on training scenes with realistic sensing."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+PI_GAINS = {  # action per newton of change of the force error, and of force error
+    "CCR/LoadCell-v0": (19.7, 24.6),
+    "CCR/PushObstacle-v0": (15.7, 10.5),
+    "CCR/TrackForce-v0": (19.8, 13.3),
+    "CCR/BracedPush-v0": (18.3, 12.3),
+    "CCR/SoftObstacle-v0": (18.6, 13.6),
+    "CCR/InsertAndPush-v0": (4.6, 2.9),
+    "CCR/SpatialPush-v0": (16.6, 12.0),
+}
+P_GAINS = {  # action per newton of force error
+    "CCR/LoadCell-v0": 21.8,
+    "CCR/PushObstacle-v0": 8.7,
+    "CCR/TrackForce-v0": 10.8,
+    "CCR/BracedPush-v0": 9.2,
+    "CCR/SoftObstacle-v0": 10.3,
+    "CCR/InsertAndPush-v0": 2.3,
+    "CCR/SpatialPush-v0": 9.2,
+}
+NEWTON_GAINS = {  # part of a Newton step
+    "CCR/LoadCell-v0": 0.3,
+    "CCR/PushObstacle-v0": 0.3,
+    "CCR/TrackForce-v0": 0.3,
+    "CCR/BracedPush-v0": 0.3,
+    "CCR/SoftObstacle-v0": 0.3,
+    "CCR/InsertAndPush-v0": 0.3,
+    "CCR/SpatialPush-v0": 0.3,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class MPCSettings:
+    """Of the model-predictive controller."""
+
+    horizon: int = 8
+    """Steps planned."""
+    effort: float = 0.05
+    """Weight of squared moves, over that of the squared force they add."""
+    latency: int = 2
+    """Steps after which the force is assumed to be seen."""
+    play_mm: float = 0.25
+    """Play of the motors that is assumed [mm]."""
+    slope: float = 0.05
+    """Force per millimetre of cable that is assumed at first [N/mm]."""
+    least_slope: float = 0.01
+    """Smallest slope that is believed [N/mm]."""
+    trust: float = 0.25
+    """Squared moves that the first slope is worth [mm²]."""
+    forgetting: float = 0.8
+    """Of moves and changes, per step."""
+    forgetting_ratio: float = 0.97
+    """Of readings of the sensor, per step."""
+
+
+MPC = {
+    "CCR/LoadCell-v0": MPCSettings(),
+    "CCR/PushObstacle-v0": MPCSettings(),
+    "CCR/TrackForce-v0": MPCSettings(),
+    "CCR/BracedPush-v0": MPCSettings(),
+    "CCR/SoftObstacle-v0": MPCSettings(),
+    "CCR/InsertAndPush-v0": MPCSettings(slope=0.3),
+    "CCR/SpatialPush-v0": MPCSettings(),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PPOSettings:
+    """Proximal policy optimisation, on observations with a memory."""
+
+    name: ClassVar[str] = "PPO"
+
+    steps: int = 600_000
+    """Environment steps to train for."""
+    envs: int = 64
+    """Environments stepped side by side."""
+    rollout: int = 128
+    """Steps of each environment between updates."""
+    batch_size: int = 2048
+    """Samples of one gradient step."""
+    epochs: int = 8
+    """Passes over a rollout."""
+    learning_rate: float = 1e-3
+    """Of Adam, decaying linearly to zero."""
+    gamma: float = 0.9
+    """Discount of rewards."""
+    gae_lambda: float = 0.9
+    """Decay of advantages."""
+    log_std_init: float = -0.5
+    """Logarithm of the first exploration noise."""
+    width: int = 64
+    """Units in each of the two hidden layers."""
+
+
+PPO_IDEAL = PPOSettings(steps=160_000, envs=32, rollout=64, batch_size=512)  # enough where sensing is ideal
+
+
+@dataclass(frozen=True, slots=True)
+class RecurrentPPOSettings:
+    """The same with an LSTM in the place of the memory."""
+
+    name: ClassVar[str] = "RecurrentPPO"
+
+    steps: int = 200_000
+    """Environment steps to train for."""
+    envs: int = 64
+    """Environments stepped side by side."""
+    rollout: int = 64
+    """Steps of each environment between updates."""
+    batch_size: int = 1024
+    """Samples of one gradient step."""
+    epochs: int = 8
+    """Passes over a rollout."""
+    learning_rate: float = 1e-3
+    """Of Adam, decaying linearly to zero."""
+    gamma: float = 0.9
+    """Discount of rewards."""
+    gae_lambda: float = 0.9
+    """Decay of advantages."""
+    log_std_init: float = -0.5
+    """Logarithm of the first exploration noise."""
+    width: int = 64
+    """Units in the hidden layer behind the LSTM."""
+    hidden: int = 32
+    """Units of the LSTM."""
+
+
+@dataclass(frozen=True, slots=True)
+class SACSettings:
+    """Soft actor-critic, on observations with a memory."""
+
+    name: ClassVar[str] = "SAC"
+
+    steps: int = 100_000
+    """Environment steps to train for."""
+    envs: int = 32
+    """Environments stepped side by side."""
+    gradient_steps: int = 4
+    """Gradient steps for one step of all environments."""
+    batch_size: int = 256
+    """Samples of one gradient step."""
+    learning_rate: float = 1e-3
+    """Of Adam, decaying linearly to zero."""
+    gamma: float = 0.9
+    """Discount of rewards."""
+    tau: float = 0.01
+    """Share of the target networks that is renewed by a gradient step."""
+    buffer: int = 100_000
+    """Steps that are kept."""
+    width: int = 64
+    """Units in each of the two hidden layers of the policy; the critics have twice as many."""
+
+
+@dataclass(frozen=True, slots=True)
+class DistilledSettings:
+    """Imitation of a teacher that knows what is hidden, on observations with a memory (DAgger)."""
+
+    name: ClassVar[str] = "Distilled"
+
+    steps: int = 400_000
+    """Environment steps to train for."""
+    envs: int = 128
+    """Environments stepped side by side."""
+    rollout: int = 64
+    """Steps of each environment between rounds of learning."""
+    gradient_steps: int = 400
+    """Gradient steps of a round."""
+    batch_size: int = 1024
+    """Samples of one gradient step, of all rounds so far."""
+    learning_rate: float = 2e-3
+    """Of Adam, decaying linearly to zero."""
+    weaning: int = 5
+    """Rounds in which the teacher still acts in some of the environments, fewer and fewer."""
+    huber: float = 0.1
+    """Error of an action beyond which the loss grows linearly."""
+    width: int = 64
+    """Units in each of the two hidden layers."""
+
+
+LearnerSettings = PPOSettings | RecurrentPPOSettings | SACSettings | DistilledSettings
+LEARNERS: dict[str, type[LearnerSettings]] = {
+    kind.name: kind for kind in (PPOSettings, RecurrentPPOSettings, SACSettings, DistilledSettings)
+}

@@ -1,0 +1,148 @@
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents import cli, report, suite
+from agents.actor import LearnedPolicy
+from agents.config import PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
+from agents.evaluate import METRICS, Episode, measure
+from agents.retrain import retrain
+from agents.suite import Entry, play, trained
+from agents.training import train
+from agents.tuned import PPOSettings
+from solver import Status
+
+
+def episode(true, goal=0.1, cost=0.0):
+    true = np.asarray(true, float)
+    goals = np.full(len(true), goal)
+    lacking = np.abs(true - goals)
+    return Episode(
+        goals, lacking, 2 * lacking, true, true, np.full(len(true), cost), (Status.CONVERGED,) * len(true), (), 1.0
+    )
+
+
+def test_the_metrics_of_a_known_episode():
+    force = np.concatenate([np.zeros(10), np.full(14, 0.2), np.full(20, 0.11), [0.0], np.full(19, 0.1)])
+    found = measure(episode(force))
+    assert found.rmse_mn == pytest.approx(1e3 * np.sqrt((20 * 0.01**2 + 0.1**2) / 40))
+    assert found.estimate_rmse_mn == pytest.approx(2 * found.rmse_mn)
+    assert found.steady_mn == pytest.approx(0, abs=1e-9)
+    assert (found.success, found.settling_step, found.contact_losses) == (1, 46, 1)
+    assert (found.overshoot, found.peak_mn) == (pytest.approx(1), pytest.approx(200))
+    never = measure(episode(np.full(64, 0.2), cost=0.01))
+    assert (never.success, never.settling_step, never.violations) == (0, 65, 64)
+    assert never.cost_mn == pytest.approx(640)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    settings = PPOSettings(steps=512, envs=4, rollout=32, batch_size=64, epochs=1, width=8)
+    return train(TrainConfig(run=tmp_path_factory.mktemp("run"), learner=settings, threads=1), progress=False)
+
+
+def test_evaluate_writes_table_figures_and_videos(run, tmp_path, monkeypatch, capsys):
+    arguments = ["evaluate", "--runs", str(run), "--out", str(tmp_path), "--episodes", "3", "--jobs", "1"]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments, "--policies", "PI", "Oracle", "PPO"])
+    cli.main()
+    assert "CCR/PushObstacle-v0, realistic sensing" in capsys.readouterr().out
+    written = json.loads((tmp_path / "evaluation.json").read_text())
+    assert [result["policy"] for result in written["results"]] == ["PPO", "PI", "Oracle"]
+    for result in written["results"]:
+        assert np.shape(result["episodes"]["rmse_mn"]) == (1, 3)
+        low, high = result["summary"]["rmse_interval_mn"]
+        assert low <= result["summary"]["rmse_iqm_mn"] <= high
+        assert sum(result["summary"]["statuses"].values()) == 3 * 64
+    for name in ("PushObstacle-v0.png", "scores.png", "profiles.png", "curves.png"):
+        assert (tmp_path / name).stat().st_size > 10_000
+    assert len(list((tmp_path / "videos").glob("*.mp4"))) == 3
+    assert "| PPO |" in (tmp_path / "evaluation.md").read_text()
+
+
+def test_every_policy_plays_the_same_scenes():
+    first, second = (play(Entry(name, "CCR/LoadCell-v0", "realistic"), 1_000_000, 2) for name in ("P", "PI"))
+    for a, b in zip(first.shown, second.shown, strict=True):
+        assert np.array_equal(a.goal, b.goal)
+        assert a.equilibria[0].scene == b.equilibria[0].scene
+
+
+def test_the_share_that_is_closed_and_whether_intervals_are_apart():
+    def result(name, errors):
+        metrics = {metric: np.ones((1, 20)) for metric in METRICS} | {"rmse_mn": np.array([errors], float)}
+        return suite.Result(Entry(name, "CCR/LoadCell-v0", "realistic"), metrics, {}, 1.0, 0.0, ())
+
+    rivals = [result("PI", 9 + np.linspace(0, 2, 20)), result("Oracle", np.zeros(20))]
+    good, poor = result("PPO", np.full(20, 2.5)), result("SAC", np.linspace(5, 14, 20))
+    assert report.closed(good, rivals) == pytest.approx(0.75)
+    assert report.apart(good, rivals)
+    assert not report.apart(poor, rivals)
+    assert report.closed(good, rivals[1:]) is None
+
+
+def test_retraining_fills_a_folder_as_that_of_the_shipped_policies(tmp_path):
+    config = RetrainConfig(out=tmp_path, learners=("PPO",), env_ids=("CCR/LoadCell-v0",), seeds=2, share=1e-6, jobs=1)
+    retrain(config)
+    files = trained("PPO", "CCR/LoadCell-v0", tmp_path)
+    assert [file.name for file in files] == ["0.pt", "1.pt"]
+    assert [LearnedPolicy(file).config.seed for file in files] == [0, 1000]
+    before = [file.stat().st_mtime_ns for file in tmp_path.glob("PPO/LoadCell-v0/*/actor.pt")]
+    retrain(config)
+    assert [file.stat().st_mtime_ns for file in tmp_path.glob("PPO/LoadCell-v0/*/actor.pt")] == before
+
+
+def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
+    arguments = ["sweep", "--what", "PI", "--trials", "2", "--episodes", "2", "--out", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments, "--env-id", "CCR/LoadCell-v0"])
+    cli.main()
+    cli.main()
+    assert "Best of 4" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("train", "ppo", "--steps", "0"),
+        ("evaluate", "--episodes", "0"),
+        ("evaluate", "--policies", "PID"),
+        ("evaluate", "--seed", "5"),
+        ("retrain", "--share", "0"),
+        ("sweep", "--env-id", "CCR/Nope-v0"),
+    ],
+)
+def test_the_command_line_exits_before_any_work(arguments, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
+    with pytest.raises(SystemExit):
+        cli.main()
+    written = capsys.readouterr()
+    assert any(word in written.out + written.err for word in ("at least", "must name", "must be above"))
+
+
+@pytest.mark.parametrize("arguments", [("train", "--env-id", "CCR/Nope-v0"), ("evaluate", "--runs", "nowhere")])
+def test_what_is_missing_is_named(arguments, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
+    with pytest.raises(SystemExit, match=r"Nope|train first"):
+        cli.main()
+
+
+def test_names_of_policies_and_environments_are_checked():
+    with pytest.raises(ValueError, match="beyond the training seeds"):
+        EvaluateConfig(seed=999_999)
+    with pytest.raises(ValueError, match="must name some of"):
+        RetrainConfig(learners=())
+    with pytest.raises(ValueError, match="trials is 0"):
+        SweepConfig(trials=0)
+
+
+@pytest.mark.parametrize("file", sorted(PRETRAINED.rglob("*.pt")), ids=str)
+def test_shipped_policies_load_and_are_of_their_environment(file):
+    policy = LearnedPolicy(file)
+    assert file in trained(policy.name, policy.config.env_id)
+    assert policy.config.sensing == "realistic"
+
+
+def test_shipped_policies_are_small():
+    assert sum(file.stat().st_size for file in PRETRAINED.rglob("*.pt")) < 2_000_000
