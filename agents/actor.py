@@ -138,6 +138,8 @@ class LearnedPolicy:
             raise FileNotFoundError(f"{path} is missing; train first: ccr-gym train --run {path.parent}")
         try:
             read = torch.load(path, weights_only=True)
+            if read["format"] != FORMAT:
+                raise ValueError(f"its format is {read['format']}; this version reads {FORMAT}: train it anew")
             self.config = TrainConfig.loads(read["config"])
             training = json.loads(read["training"])
             self.curve = Curve(tuple(training["steps"]), tuple(training["returns"]))
@@ -158,8 +160,17 @@ class LearnedPolicy:
         self._memory = self._state = None
 
     def act(self, observation: Observation) -> np.ndarray:
-        """The mean action for a dictionary observation."""
+        """The mean action for a dictionary observation.
+
+        Raises:
+            ValueError: If the observation is not that of its environment with the sensing it was trained with.
+        """
         rows = self._rows({key: value[None] for key, value in observation.items()})
+        if rows.shape[1] != self._mean.size:
+            raise ValueError(
+                f"the observation makes a row of {rows.shape[1]} numbers; this policy takes {self._mean.size}, "
+                f"those of {self.config.env_id} with {self.config.sensing} sensing"
+            )
         rows = np.clip((rows - self._mean) / self._deviation, -CLIP, CLIP)
         with torch.no_grad():
             action, self._state = self._network(torch.from_numpy(rows.astype(np.float32)), self._state)

@@ -19,13 +19,13 @@ ABOUT = {
 
 def card(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:
     """What a trained policy is, how it was made, what it achieves and where it ends."""
-    entry, summary = result.entry, result.summary()
+    entry, summary = result.entry, result.summary
     first = LearnedPolicy(entry.files[0])
     settings = ", ".join(f"{name} {value:g}" for name, value in asdict(first.config.learner).items())
     seeds = ", ".join(f"{LearnedPolicy(file).config.seed}" for file in entry.files)
     ranges = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in asdict(Sensing()).items())
     low, high = summary["rmse_interval_mn"]
-    others = "; ".join(f"{r.entry.policy} {r.summary()['rmse_iqm_mn']:.2f}" for r in rivals if r is not result)
+    others = "; ".join(f"{r.entry.policy} {r.summary['rmse_iqm_mn']:.2f}" for r in rivals if r is not result)
     spent, share, over = summary["training_seconds"], summary["success"], summary["violations"]
     error, worst = summary["rmse_iqm_mn"], summary["rmse_cvar_mn"]
     parts = (

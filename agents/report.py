@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -13,6 +14,8 @@ from agents.figures import draw_curves, draw_episodes, draw_profiles, draw_score
 from agents.suite import Result, folder_name
 from agents.tuned import LEARNERS
 
+NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
+WIDTH = 190  # of a printed table
 BOUND, RIVAL = "Oracle", "PI"
 COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {  # heading of a column, and its text from a summary
     "force error [mN]": lambda s: "{:.2f} [{:.2f}, {:.2f}]".format(s["rmse_iqm_mn"], *s["rmse_interval_mn"]),
@@ -35,6 +38,8 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
     told = {"episodes": config.episodes, "seed": config.seed, "split": "test"}
     report = told | {"results": [result.as_dict() for result in results]}
     (config.out / "evaluation.json").write_text(json.dumps(report) + "\n")
+    first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
+    (config.out / "scores.json").write_text(json.dumps(first, indent=1) + "\n")
     by_id = group(results)
     (config.out / "evaluation.md").write_text(f"{matrix(by_id)}\n{markdown(by_id)}")
     for result in results:
@@ -44,7 +49,7 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
             (folder / "README.md").write_text(card(result, by_id[result.entry.env_id], config))
     for env_id, here in by_id.items():
         draw_episodes({r.entry.policy: r.shown for r in here}, config.out / f"{folder_name(env_id)}.png")
-    draw_scores({env_id: {r.entry.policy: r.summary() for r in here} for env_id, here in by_id.items()}, config.out)
+    draw_scores({env_id: {r.entry.policy: r.summary for r in here} for env_id, here in by_id.items()}, config.out)
     draw_profiles(
         {env_id: {r.entry.policy: r.rmse.ravel() for r in here} for env_id, here in by_id.items()}, config.out
     )
@@ -62,21 +67,21 @@ def group(results: list[Result]) -> dict[str, list[Result]]:
 
 def closed(result: Result, rivals: list[Result]) -> float | None:
     """Share of the distance from the PI controller's force error to the bound's that a policy closes."""
-    errors = {r.entry.policy: float(r.summary()["rmse_iqm_mn"]) for r in rivals}
+    errors = {r.entry.policy: float(r.summary["rmse_iqm_mn"]) for r in rivals}
     if BOUND not in errors or RIVAL not in errors:
         return None
-    return (errors[RIVAL] - float(result.summary()["rmse_iqm_mn"])) / (errors[RIVAL] - errors[BOUND])
+    return (errors[RIVAL] - float(result.summary["rmse_iqm_mn"])) / (errors[RIVAL] - errors[BOUND])
 
 
 def apart(result: Result, rivals: list[Result]) -> bool:
     """Whether a policy's interval lies below that of the PI controller."""
-    others = [r.summary()["rmse_interval_mn"] for r in rivals if r.entry.policy == RIVAL]
-    return bool(others) and result.summary()["rmse_interval_mn"][1] < others[0][0]
+    others = [r.summary["rmse_interval_mn"] for r in rivals if r.entry.policy == RIVAL]
+    return bool(others) and result.summary["rmse_interval_mn"][1] < others[0][0]
 
 
 def cells(result: Result, rivals: list[Result]) -> list[str]:
     """A row of the table."""
-    summary, share = result.summary(), closed(result, rivals)
+    summary, share = result.summary, closed(result, rivals)
     gain = "" if share is None else f"{share:.0%}" + (" *" if apart(result, rivals) else "")
     return [result.entry.policy, gain, *(text(summary) for text in COLUMNS.values())]
 
@@ -108,7 +113,7 @@ def matrix(by_id: dict[str, list[Result]]) -> str:
 def _cell(result: Result | None, rivals: list[Result]) -> str:
     if result is None:
         return ""
-    summary = result.summary()
+    summary = result.summary
     low, high = summary["rmse_interval_mn"]
     text = f"{summary['rmse_iqm_mn']:.2f} [{low:.2f}, {high:.2f}]"
     wins = (closed(result, rivals) or 0) >= 0.5 and apart(result, rivals) and result.entry.policy != BOUND
@@ -117,11 +122,11 @@ def _cell(result: Result | None, rivals: list[Result]) -> str:
 
 def show(by_id: dict[str, list[Result]]) -> None:
     """Print the tables."""
-    console = Console(width=max(160, Console().width))
+    console = Console(width=max(WIDTH, Console().width))
     for env_id, here in by_id.items():
         table = Table(title=f"{env_id}, {here[0].entry.sensing} sensing")
         for heading in ("policy", "closed", *COLUMNS):
-            table.add_column(heading, justify="left" if heading == "policy" else "right")
+            table.add_column(heading, justify="left" if heading == "policy" else "right", no_wrap=heading in NARROW)
         for result in here:
             table.add_row(*cells(result, here))
         console.print(table)

@@ -24,8 +24,8 @@ def runs(config: RetrainConfig) -> list[TrainConfig]:
             threads=1,
             learner=replace(settings, steps=max(1, round(config.share * settings.steps))),
         )
-        for learner in config.learners
         for seed in range(config.seeds)
+        for learner in config.learners
         for env_id in config.env_ids
         for settings in [LEARNERS[learner]()]
     ]

@@ -63,46 +63,39 @@ class Result:
     Attributes:
         entry: Which.
         metrics: Of every training seed and episode, ``(seeds, episodes)`` each, by name.
-        statuses: Solver statuses counted over all steps.
-        decisions_per_second: Decisions of the policy per second.
-        training_seconds: Mean time of a training run [s]; 0 for a controller.
+        summary: The numbers of a table, as :func:`summarize` gives them.
         shown: First episodes of the first training seed.
     """
 
     entry: Entry
     metrics: dict[str, np.ndarray]
-    statuses: dict[str, int]
-    decisions_per_second: float
-    training_seconds: float
-    shown: tuple[Episode, ...]
+    summary: dict[str, Any]
+    shown: tuple[Episode, ...] = ()
 
     @property
     def rmse(self) -> np.ndarray:
         """Force error of every training seed and episode, ``(seeds, episodes)`` [mN]."""
         return self.metrics["rmse_mn"]
 
-    def summary(self) -> dict[str, Any]:
-        """The numbers of a table: interquartile means with their intervals, means and tail means."""
-        rmse = self.rmse
-        means = {name: float(values.mean()) for name, values in self.metrics.items()}
-        return {
-            "rmse_iqm_mn": float(iqm(rmse.ravel())),
-            "rmse_interval_mn": iqm_interval(list(rmse)),
-            "rmse_of_seeds_mn": [float(iqm(row)) for row in rmse],
-            "rmse_cvar_mn": cvar(rmse.ravel()),
-            **means,
-            "settling_step": float(np.median(self.metrics["settling_step"])),
-            "overshoot": float(np.median(self.metrics["overshoot"])),
-            "statuses": self.statuses,
-            "decisions_per_second": self.decisions_per_second,
-            "training_seconds": self.training_seconds,
-        }
-
     def as_dict(self) -> dict[str, Any]:
         """For JSON: summary and every episode."""
         episodes = {name: np.round(values, 5).tolist() for name, values in self.metrics.items()}
         entry = asdict(self.entry) | {"files": [file.name for file in self.entry.files]}
-        return entry | {"summary": self.summary(), "episodes": episodes}
+        return entry | {"summary": self.summary, "episodes": episodes}
+
+
+def summarize(metrics: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Interquartile mean of the force error with its interval and tail mean; means or medians of what else there is."""
+    rmse = metrics["rmse_mn"]
+    return {
+        **{name: float(values.mean()) for name, values in metrics.items()},
+        "settling_step": float(np.median(metrics["settling_step"])),
+        "overshoot": float(np.median(metrics["overshoot"])),
+        "rmse_iqm_mn": float(iqm(rmse.ravel())),
+        "rmse_interval_mn": iqm_interval(list(rmse)),
+        "rmse_of_seeds_mn": [float(iqm(row)) for row in rmse],
+        "rmse_cvar_mn": cvar(rmse.ravel()),
+    }
 
 
 def entries(config: EvaluateConfig) -> list[Entry]:
@@ -159,10 +152,13 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
     if video is not None:
         record(policies[0], entry.env_id, seed, 1, video, **told)
     table = np.array(rows).reshape(len(policies), episodes, len(METRICS))
-    counted = {status.name: statuses[status.name] for status in Status if statuses[status.name]}
     metrics = {name: table[..., k] for k, name in enumerate(METRICS)}
-    spent = float(np.mean([getattr(policy, "seconds", 0.0) for policy in policies]))
-    return Result(entry, metrics, counted, steps / max(seconds, 1e-9), spent, tuple(shown))
+    summary = summarize(metrics) | {
+        "statuses": {status.name: statuses[status.name] for status in Status if statuses[status.name]},
+        "decisions_per_second": steps / max(seconds, 1e-9),
+        "training_seconds": float(np.mean([getattr(policy, "seconds", 0.0) for policy in policies])),
+    }
+    return Result(entry, metrics, summary, tuple(shown))
 
 
 def play_all(config: EvaluateConfig, played: list[Entry]) -> Iterator[Result]:

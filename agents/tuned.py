@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 PI_GAINS = {  # action per newton of change of the force error, and of force error
-    "CCR/LoadCell-v0": (19.7, 24.6),
+    "CCR/LoadCell-v0": (38.9, 28.9),
     "CCR/PushObstacle-v0": (15.7, 10.5),
-    "CCR/TrackForce-v0": (19.8, 13.3),
+    "CCR/TrackForce-v0": (26.0, 10.7),
     "CCR/BracedPush-v0": (18.3, 12.3),
     "CCR/SoftObstacle-v0": (18.6, 13.6),
     "CCR/InsertAndPush-v0": (4.6, 2.9),

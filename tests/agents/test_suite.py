@@ -7,13 +7,15 @@ import pytest
 
 from agents import cli, report, suite
 from agents.actor import LearnedPolicy
-from agents.config import PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
-from agents.evaluate import METRICS, Episode, measure
+from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
+from agents.evaluate import METRICS, Episode, measure, scores
 from agents.retrain import retrain
 from agents.suite import Entry, play, trained
 from agents.training import train
 from agents.tuned import PPOSettings
 from solver import Status
+
+SCORES = json.loads((PRETRAINED / "scores.json").read_text())
 
 
 def episode(true, goal=0.1, cost=0.0):
@@ -72,7 +74,7 @@ def test_every_policy_plays_the_same_scenes():
 def test_the_share_that_is_closed_and_whether_intervals_are_apart():
     def result(name, errors):
         metrics = {metric: np.ones((1, 20)) for metric in METRICS} | {"rmse_mn": np.array([errors], float)}
-        return suite.Result(Entry(name, "CCR/LoadCell-v0", "realistic"), metrics, {}, 1.0, 0.0, ())
+        return suite.Result(Entry(name, "CCR/LoadCell-v0", "realistic"), metrics, suite.summarize(metrics))
 
     rivals = [result("PI", 9 + np.linspace(0, 2, 20)), result("Oracle", np.zeros(20))]
     good, poor = result("PPO", np.full(20, 2.5)), result("SAC", np.linspace(5, 14, 20))
@@ -142,6 +144,15 @@ def test_shipped_policies_load_and_are_of_their_environment(file):
     policy = LearnedPolicy(file)
     assert file in trained(policy.name, policy.config.env_id)
     assert policy.config.sensing == "realistic"
+
+
+@pytest.mark.parametrize("name", sorted(SCORES))
+def test_shipped_policies_give_the_numbers_of_the_table(name):
+    """``scores.json`` is what ``ccr-gym evaluate`` wrote of their first test scenes."""
+    policy, env_id = name.split()
+    (file,) = trained(policy, env_id)
+    found = scores(LearnedPolicy(file), env_id, EVALUATION_SEED, 2, sensing="realistic", split="test")
+    assert found == pytest.approx(SCORES[name][:2], rel=0.01, abs=0.02)
 
 
 def test_shipped_policies_are_small():

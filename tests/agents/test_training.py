@@ -11,6 +11,7 @@ from agents import training
 from agents.actor import ACTOR, LearnedPolicy
 from agents.config import TrainConfig
 from agents.learners import KINDS, environments
+from agents.suite import trained
 from agents.training import train
 from agents.tuned import PPOSettings, RecurrentPPOSettings, SACSettings
 
@@ -116,9 +117,16 @@ def test_a_foreign_file_is_refused(tmp_path):
     (tmp_path / ACTOR).write_bytes(b"nothing")
     with pytest.raises(ValueError, match="not a trained policy"):
         LearnedPolicy(tmp_path)
-    torch.save({"format": 1}, tmp_path / ACTOR)
-    with pytest.raises(ValueError, match="not a trained policy"):
+    torch.save({"format": 2}, tmp_path / ACTOR)
+    with pytest.raises(ValueError, match="its format is 2"):
         LearnedPolicy(tmp_path)
+
+
+def test_an_observation_of_another_environment_is_refused():
+    policy = LearnedPolicy(trained("Distilled", "CCR/PushObstacle-v0")[0])
+    env = gymnasium.make("CCR/BracedPush-v0", sensing="realistic", disable_env_checker=True)
+    with pytest.raises(ValueError, match=r"those of CCR/PushObstacle-v0 with realistic sensing"):
+        policy.act(env.reset(seed=0)[0])
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"seed": 3}', '{"run": "here", "learner": {"name": "PPO", "stepz": 3}}'])
