@@ -12,6 +12,39 @@ from agents.tuned import MPC, MPCSettings
 from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 
 SMALLEST_MM = 0.005  # moves below are not worth taking up the play for
+LATENCIES = 7  # steps of latency that are thought possible, from 0
+SLACKS_MM = np.linspace(0.0, 0.5, 101)  # halves of the play that are thought possible
+
+
+class Lag:
+    """Latency and play of the motors, from where the cable is seen to be: the exact model tells that from a shape.
+
+    Every pair of them makes of the motors' past a place to be seen now; the pair with the least squared errors so far
+    is believed.
+    """
+
+    def __init__(self) -> None:
+        self._places: list[np.ndarray] = []
+        self._errors = np.zeros((LATENCIES, SLACKS_MM.size))
+        self.latency, self._pair = 0, 0
+
+    def see(self, motor: float, place: float) -> None:
+        """Take in where the motor is and where the cable is seen to be [mm]."""
+        before = self._places[-1] if self._places else np.full(SLACKS_MM.size, motor)
+        self._places.append(np.clip(before, motor - SLACKS_MM, motor + SLACKS_MM))
+        for latency in range(LATENCIES):
+            self._errors[latency] += (self._places[max(len(self._places) - 1 - latency, 0)] - place) ** 2
+        self.latency, self._pair = divmod(int(self._errors.argmin()), SLACKS_MM.size)
+
+    @property
+    def slack(self) -> float:
+        """Half of the play [mm]."""
+        return float(SLACKS_MM[self._pair])
+
+    @property
+    def place(self) -> float:
+        """Where the cable is now [mm]."""
+        return float(self._places[-1][self._pair])
 
 
 @dataclass(slots=True)
@@ -19,10 +52,10 @@ class PredictiveController:
     """Plans the moves of the cable that bring a force which is linear in them along the set-points ahead.
 
     The plan is a quadratic programme, solved by CasADi at every step, whose first move is made. What it needs is
-    estimated from what is seen: the force as the virtual-work estimate, which has no noise, times the ratio at which
-    the sensor, whose zero is known from before contact, has read it so far; the slope of the force from the moves
-    and changes so far; the present force from the moves that are not seen yet, with a latency and a play of the motors
-    that are assumed. In space both cables move along the way of the search; an insertion is left as it is.
+    estimated from what is seen and the known geometry of the robot: latency and play (:class:`Lag`), and with them the
+    place of the cable that is not seen yet; force and slope there from a curve through the readings so far, those taken
+    near it foremost; the zero of the sensor from before contact. In space both cables move along the way of the
+    search; an insertion is left as it is.
 
     Attributes:
         settings: What is assumed, and the weights of the plan.
@@ -30,67 +63,60 @@ class PredictiveController:
 
     settings: MPCSettings = field(default_factory=MPCSettings)
     name: str = "MPC"
-    _limit_mm: float = field(default=14.0, init=False)
-    _increment_mm: float = field(default=0.5, init=False)
-    _readings: list[np.ndarray] = field(default_factory=list, init=False)
-    _places: list[float] = field(default_factory=list, init=False)
-    _last: float | None = field(default=None, init=False)
-    _ratio: np.ndarray = field(default_factory=lambda: np.zeros(2), init=False)
-    _slope: np.ndarray = field(default_factory=lambda: np.zeros(2), init=False)
+    _env: Any = field(default=None, init=False)
+    _lag: Lag = field(default_factory=Lag, init=False)
+    _free: list[np.ndarray] = field(default_factory=list, init=False)
+    _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
 
     @classmethod
     def tuned(cls, env_id: str) -> "PredictiveController":
         """With the settings of least force error on training scenes with realistic sensing."""
-        return cls(MPC.get(env_id, MPCSettings()))
+        return cls(MPC[env_id])
 
     def reset(self, env: Any = None) -> None:
-        """Forget the episode; the range and the increments of the motors are those of the environment."""
-        if env is not None:
-            settings = env.get_wrapper_attr("settings")
-            self._limit_mm, self._increment_mm = settings.cable_limit_mm, settings.max_increment_mm
+        """Forget the episode; the robot and the range of its motors are those of the environment."""
+        self._env, self._lag = env, Lag()
+        self._free.clear()
         self._readings.clear()
-        self._places.clear()
-        self._last = None
-        self._ratio = np.zeros(2)
-        self._slope = np.array([self.settings.slope, 1.0]) * self.settings.trust
 
     def act(self, observation: Observation) -> np.ndarray:
         """Pull until something touches, then plan."""
-        way, play = search(observation), self.settings.play_mm / 2
-        motor = float(observation["cable"] @ way[: observation["cable"].size]) * self._limit_mm / float(way @ way)
-        before = self._places[-1] if self._places else motor
-        place = min(max(before, motor - play), motor + play)
-        self._places.append(place)
+        way, settings = search(observation), self._env.get_wrapper_attr("settings")
+        along = way[: observation["cable"].size] / float(way @ way)
+        motor = float(observation["cable"] @ along) * settings.cable_limit_mm
+        place = float(seen_cables(observation, settings.robot) @ along)
+        self._lag.see(motor, place)
+        measured = FORCE_SCALE_N * observation["force_measured"].astype(float)
         if not observation["contact"].any():
-            self._readings.append(observation["force_measured"].astype(float))
+            self._free.append(measured)
             return way
-        late = self.settings.latency
-        unseen = np.array([self._places[max(-1 - k, -len(self._places))] for k in (0, late, late + 1)])
-        force = self._force(observation)
-        if self._last is not None:
-            moved = unseen[1] - unseen[2]
-            self._slope *= self.settings.forgetting
-            self._slope += [moved * (force - self._last), moved * moved]
-            self._slope += (1 - self.settings.forgetting) * self.settings.trust * np.array([self.settings.slope, 1.0])
-        self._last = force
-        slope = max(self._slope[0] / self._slope[1], self.settings.least_slope)
-        present = force + slope * (unseen[0] - unseen[1])
-        move = self._increment_mm * self._plan(slope * self._increment_mm, present, self._goals(observation))
+        zero = np.mean(self._free, axis=0) if self._free else 0.0
+        self._readings.append((place, float(np.linalg.norm(measured - zero))))
+        force, slope = self._curve(self._lag.place)
+        full = settings.max_increment_mm
+        move = full * self._plan(max(slope, self.settings.least_slope) * full, force, self._goals(observation))
         if abs(move) < SMALLEST_MM:
             return 0.0 * way
-        effort = (place + move + np.copysign(play, move) - motor) / self._increment_mm
+        effort = (self._lag.place + move + np.copysign(self._lag.slack, move) - motor) / full
         return np.asarray(min(max(effort, -1.0), 1.0) * way, np.float32)
 
-    def _force(self, observation: Observation) -> float:
-        """Magnitude of the force when it was seen [N]."""
-        zero = np.mean(self._readings, axis=0) if self._readings else 0.0
-        measured, estimate = (
-            np.linalg.norm(observation["force_measured"] - zero),
-            np.linalg.norm(observation["force_est"]),
+    def _curve(self, place: float) -> tuple[float, float]:
+        """Force [N] and its slope [N/mm] at a place, from a curve through the readings, those near it foremost.
+
+        The curve stiffens at a rate that is assumed, ``F + F' (exp(κ d) − 1) / κ`` at a distance d; an assumed slope is
+        a reading as well.
+        """
+        places, forces = np.array(self._readings).T
+        away, rate, trust = places - place, self.settings.stiffening, self.settings.trust
+        width = self.settings.width_mm + np.abs(away).min()
+        weights = np.exp(-0.5 * (away / width) ** 2)
+        shape = np.expm1(rate * away) / rate
+        cross = weights @ shape
+        matrix = np.array([[weights.sum(), cross], [cross, weights @ shape**2 + trust]])
+        force, slope = np.linalg.solve(
+            matrix, [weights @ forces, weights @ (shape * forces) + trust * self.settings.slope]
         )
-        self._ratio = self.settings.forgetting_ratio * self._ratio + [measured * estimate, estimate * estimate]
-        share = self._ratio[0] / self._ratio[1] if self._ratio[1] > 0 else 0.0
-        return float(share * estimate) * FORCE_SCALE_N
+        return float(force), float(slope)
 
     def _goals(self, observation: Observation) -> np.ndarray:
         """Set-points after each of the next steps [N]."""
@@ -104,6 +130,30 @@ class PredictiveController:
         programme = plan(self.settings.horizon, self.settings.effort)
         moves = programme(p=np.concatenate([[gain, force], goals]), lbx=-1.0, ubx=1.0)["x"]
         return float(moves[0])
+
+
+def seen_cables(observation: Observation, robot: Any) -> np.ndarray:
+    """Displacements of the cables when the nodes were seen, ``(cables,)`` [mm]: a cable runs straight between holes."""
+    if "frames" not in observation:
+        scale = max(robot.lengths_mm)
+        length = float(observation["length"][0]) * scale if "length" in observation else robot.length_mm
+        nodes = observation["nodes"].astype(float).reshape(-1, 3)
+        angles = np.pi * nodes[:, 2]
+        holes = scale * nodes[:, :2] + robot.offset_mm * np.column_stack([np.cos(angles), np.sin(angles)])
+        return np.array([length - _length(holes)])
+    nodes = robot.length_mm * observation["nodes"].astype(float).reshape(-1, 3)
+    first, last = np.moveaxis(observation["frames"].astype(float).reshape(-1, 2, 3), 1, 0)
+    second = np.cross(last, first)
+    displacements = []
+    for angle in (0.0, robot.angle):
+        hole = robot.offset_mm * (np.cos(angle) * first + np.sin(angle) * second)
+        pulled, opposite = (robot.length_mm - _length(nodes + side * hole) for side in (1, -1))
+        displacements.append(pulled if pulled > 0 else -opposite)
+    return np.array(displacements)
+
+
+def _length(points: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 @cache

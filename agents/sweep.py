@@ -52,13 +52,11 @@ def _policy(trial: optuna.Trial, config: SweepConfig) -> Policy:
 def _mpc(trial: optuna.Trial) -> MPCSettings:
     return MPCSettings(
         effort=trial.suggest_float("effort", 0.01, 10.0, log=True),
-        latency=trial.suggest_int("latency", 1, 3),
-        play_mm=trial.suggest_float("play_mm", 0.0, 0.4),
-        slope=trial.suggest_float("slope", 0.01, 0.3, log=True),
-        least_slope=trial.suggest_float("least_slope", 0.002, 0.1, log=True),
-        trust=trial.suggest_float("trust", 0.01, 3.0, log=True),
-        forgetting=trial.suggest_float("forgetting", 0.5, 0.98),
-        forgetting_ratio=trial.suggest_float("forgetting_ratio", 0.8, 0.995),
+        slope=trial.suggest_float("slope", 0.01, 1.0, log=True),
+        least_slope=trial.suggest_float("least_slope", 0.001, 0.1, log=True),
+        trust=trial.suggest_float("trust", 0.001, 1.0, log=True),
+        stiffening=trial.suggest_float("stiffening", 0.01, 1.0, log=True),
+        width_mm=trial.suggest_float("width_mm", 0.05, 2.0, log=True),
     )
 
 

@@ -40,20 +40,16 @@ class MPCSettings:
     """Steps planned."""
     effort: float = 0.05
     """Weight of squared moves, over that of the squared force they add."""
-    latency: int = 2
-    """Steps after which the force is assumed to be seen."""
-    play_mm: float = 0.25
-    """Play of the motors that is assumed [mm]."""
-    slope: float = 0.05
+    slope: float = 0.1
     """Force per millimetre of cable that is assumed at first [N/mm]."""
-    least_slope: float = 0.01
+    least_slope: float = 0.005
     """Smallest slope that is believed [N/mm]."""
-    trust: float = 0.25
-    """Squared moves that the first slope is worth [mm²]."""
-    forgetting: float = 0.8
-    """Of moves and changes, per step."""
-    forgetting_ratio: float = 0.97
-    """Of readings of the sensor, per step."""
+    trust: float = 0.05
+    """Squared moves that the assumed slope is worth [mm²]."""
+    stiffening: float = 0.4
+    """Rate at which the slope is assumed to grow with the cable [1/mm]."""
+    width_mm: float = 0.3
+    """Distance from a reading within which it counts [mm]."""
 
 
 MPC = {
