@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
@@ -16,6 +17,7 @@ from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import nn
 
+import ccr_gym  # noqa: F401 - registers the ids
 from agents.config import TrainConfig
 from agents.memory import Memory
 from agents.policy import Observation
@@ -152,12 +154,18 @@ class LearnedPolicy:
         except Exception as error:
             raise ValueError(f"{path} is not a trained policy: {error!r}") from error
         self.name = self.config.learner.name
-        self._memory: Memory | None = None
+        env = gymnasium.make(self.config.env_id, sensing=self.config.sensing, disable_env_checker=True)
+        assert isinstance(env.observation_space, spaces.Dict)
+        self._sizes = {key: box.shape for key, box in env.observation_space.items()}
+        recurrent = isinstance(self.config.learner, RecurrentPPOSettings)
+        self._memory = None if recurrent else Memory(env.observation_space, 1, env.get_wrapper_attr("settings"))
         self._state: Any = None
 
     def reset(self, env: Any = None) -> None:
         """Forget the episode before."""
-        self._memory = self._state = None
+        self._state = None
+        if self._memory is not None:
+            self._memory.forget()
 
     def act(self, observation: Observation) -> np.ndarray:
         """The mean action for a dictionary observation.
@@ -165,23 +173,13 @@ class LearnedPolicy:
         Raises:
             ValueError: If the observation is not that of its environment with the sensing it was trained with.
         """
-        rows = self._rows({key: value[None] for key, value in observation.items()})
-        if rows.shape[1] != self._mean.size:
-            raise ValueError(
-                f"the observation makes a row of {rows.shape[1]} numbers; this policy takes {self._mean.size}, "
-                f"those of {self.config.env_id} with {self.config.sensing} sensing"
-            )
-        rows = np.clip((rows - self._mean) / self._deviation, -CLIP, CLIP)
+        sizes = {key: value.shape for key, value in observation.items()}
+        if sizes != self._sizes:
+            trained = f"{self.config.env_id} with {self.config.sensing} sensing"
+            raise ValueError(f"the observation has the shapes {sizes}; those of {trained} are {self._sizes}")
+        rows = {key: value[None] for key, value in observation.items()}
+        row = np.concatenate(list(rows.values()), axis=1) if self._memory is None else self._memory.recall(rows)
+        row = np.clip((row - self._mean) / self._deviation, -CLIP, CLIP)
         with torch.no_grad():
-            action, self._state = self._network(torch.from_numpy(rows.astype(np.float32)), self._state)
+            action, self._state = self._network(torch.from_numpy(row.astype(np.float32)), self._state)
         return np.asarray(action[0].numpy())
-
-    def _rows(self, observation: Observation) -> np.ndarray:
-        if isinstance(self.config.learner, RecurrentPPOSettings):
-            return np.concatenate(list(observation.values()), axis=1)
-        if self._memory is None:
-            boxes: dict[str, spaces.Space[Any]] = {
-                key: spaces.Box(-np.inf, np.inf, value.shape[1:]) for key, value in observation.items()
-            }
-            self._memory = Memory(spaces.Dict(boxes), 1)
-        return self._memory.recall(observation)

@@ -2,7 +2,8 @@
 
 Latency and backlash hide the present, and the sensor's bias shows only while nothing touches: an observation alone is
 not enough. The memory is fixed and small: a zero of the force sensor, the ratio of its readings to the virtual-work
-estimate, which has no noise, past errors at four time scales, the last moves.
+estimate, which has no noise, past errors at four time scales, the last moves, and the latency and play that explain
+where the cables are seen to be.
 """
 
 from collections.abc import Mapping
@@ -13,7 +14,9 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from agents.lag import Lag, seen_cables
 from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym.settings import Settings
 
 DECAYS = (0.0, 0.5, 0.8, 0.95)  # of the averages of past errors, per step
 TINY = 1e-9
@@ -31,9 +34,10 @@ class Memory:
     Args:
         space: Space of one observation, a dictionary.
         count: Number N of episodes.
+        settings: Of their environments.
     """
 
-    def __init__(self, space: spaces.Dict, count: int) -> None:
+    def __init__(self, space: spaces.Dict, count: int, settings: Settings) -> None:
         sizes = {key: box.shape[0] for key, box in space.items() if box.shape}
         self._moved = [key for key in MOVED if key in sizes]
         moved, goal = sum(sizes[key] for key in self._moved), sizes["desired_force"]
@@ -43,7 +47,10 @@ class Memory:
         self._errors = np.zeros((count, len(DECAYS), 2 * goal))
         self._moves = np.zeros((count, MOVES, moved))
         self._places = np.full((count, moved), np.nan)
-        remembered = sizes["force_measured"] + 1 + goal + len(DECAYS) * 2 * goal + MOVES * moved
+        self._settings, self._lag = settings, Lag(count, sizes["cable"])
+        remembered = (
+            sizes["force_measured"] + 1 + goal + len(DECAYS) * 2 * goal + MOVES * moved + 2 + 2 * sizes["cable"]
+        )
         self.size = sum(sizes.values()) + remembered
 
     def forget(self, which: Any = ALL) -> None:
@@ -51,13 +58,14 @@ class Memory:
         for part in (self._zero, self._readings, self._fit, self._errors, self._moves):
             part[which] = 0.0
         self._places[which] = np.nan
+        self._lag.forget(which)
 
     def recall(self, observation: Mapping[str, np.ndarray], which: Any = ALL) -> np.ndarray:
         """Take in what some episodes show now; what they show and have shown, ``(k, size)`` float32.
 
         Args:
             observation: Arrays ``(k, ...)``, one row for each of these episodes.
-            which: The episodes, ``(N,)`` bool or a slice; each of them is at its next step.
+            which: The episodes, a slice or indices; each of them is at its next step.
         """
         touching = observation["contact"].any(axis=1, keepdims=True)
         measured, estimate = (observation[key].astype(float) for key in ("force_measured", "force_est"))
@@ -79,7 +87,11 @@ class Memory:
         self._zero[which], self._readings[which], self._fit[which] = zero, readings, fit
         self._errors[which], self._places[which], self._moves[which] = errors, places, moves
         remembered = (zero, ratio, force, errors.reshape(len(errors), -1), moves.reshape(len(moves), -1))
-        return np.concatenate([*observation.values(), *remembered], axis=1).astype(np.float32)
+        motors, lag = self._settings.cable_limit_mm * observation["cable"].astype(float), self._lag
+        lag.see(motors, seen_cables(observation, self._settings.robot), which)
+        here = lag.places[which]
+        explained = (lag.latency[which][:, None], lag.slack[which][:, None], here - lag.seen[which], here - motors)
+        return np.concatenate([*observation.values(), *remembered, *explained], axis=1).astype(np.float32)
 
 
 def _size(vectors: np.ndarray) -> np.ndarray:
@@ -98,7 +110,7 @@ class MemoryVecEnv(VecEnvWrapper):
 
     def __init__(self, venv: VecEnv) -> None:
         assert isinstance(venv.observation_space, spaces.Dict)
-        self._memory = Memory(venv.observation_space, venv.num_envs)
+        self._memory = Memory(venv.observation_space, venv.num_envs, venv.get_attr("settings", [0])[0])
         super().__init__(venv, spaces.Box(-np.inf, np.inf, (self._memory.size,), np.float32))
 
     def reset(self) -> np.ndarray:

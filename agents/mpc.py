@@ -7,44 +7,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from agents.lag import Lag, seen_cables
 from agents.policy import Observation, search
 from agents.tuned import MPC, MPCSettings
 from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 
 SMALLEST_MM = 0.005  # moves below are not worth taking up the play for
-LATENCIES = 7  # steps of latency that are thought possible, from 0
-SLACKS_MM = np.linspace(0.0, 0.5, 101)  # halves of the play that are thought possible
-
-
-class Lag:
-    """Latency and play of the motors, from where the cable is seen to be: the exact model tells that from a shape.
-
-    Every pair of them makes of the motors' past a place to be seen now; the pair with the least squared errors so far
-    is believed.
-    """
-
-    def __init__(self) -> None:
-        self._places: list[np.ndarray] = []
-        self._errors = np.zeros((LATENCIES, SLACKS_MM.size))
-        self.latency, self._pair = 0, 0
-
-    def see(self, motor: float, place: float) -> None:
-        """Take in where the motor is and where the cable is seen to be [mm]."""
-        before = self._places[-1] if self._places else np.full(SLACKS_MM.size, motor)
-        self._places.append(np.clip(before, motor - SLACKS_MM, motor + SLACKS_MM))
-        for latency in range(LATENCIES):
-            self._errors[latency] += (self._places[max(len(self._places) - 1 - latency, 0)] - place) ** 2
-        self.latency, self._pair = divmod(int(self._errors.argmin()), SLACKS_MM.size)
-
-    @property
-    def slack(self) -> float:
-        """Half of the play [mm]."""
-        return float(SLACKS_MM[self._pair])
-
-    @property
-    def place(self) -> float:
-        """Where the cable is now [mm]."""
-        return float(self._places[-1][self._pair])
 
 
 @dataclass(slots=True)
@@ -64,7 +32,7 @@ class PredictiveController:
     settings: MPCSettings = field(default_factory=MPCSettings)
     name: str = "MPC"
     _env: Any = field(default=None, init=False)
-    _lag: Lag = field(default_factory=Lag, init=False)
+    _lag: Lag = field(default_factory=lambda: Lag(1, 1), init=False)
     _free: list[np.ndarray] = field(default_factory=list, init=False)
     _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
 
@@ -75,7 +43,7 @@ class PredictiveController:
 
     def reset(self, env: Any = None) -> None:
         """Forget the episode; the robot and the range of its motors are those of the environment."""
-        self._env, self._lag = env, Lag()
+        self._env, self._lag = env, Lag(1, 1)
         self._free.clear()
         self._readings.clear()
 
@@ -85,19 +53,20 @@ class PredictiveController:
         along = way[: observation["cable"].size] / float(way @ way)
         motor = float(observation["cable"] @ along) * settings.cable_limit_mm
         place = float(seen_cables(observation, settings.robot) @ along)
-        self._lag.see(motor, place)
+        self._lag.see(np.array([[motor]]), np.array([[place]]))
+        here, slack = self._lag.places.item(), self._lag.slack.item()
         measured = FORCE_SCALE_N * observation["force_measured"].astype(float)
         if not observation["contact"].any():
             self._free.append(measured)
             return way
         zero = np.mean(self._free, axis=0) if self._free else 0.0
         self._readings.append((place, float(np.linalg.norm(measured - zero))))
-        force, slope = self._curve(self._lag.place)
+        force, slope = self._curve(here)
         full = settings.max_increment_mm
         move = full * self._plan(max(slope, self.settings.least_slope) * full, force, self._goals(observation))
         if abs(move) < SMALLEST_MM:
             return 0.0 * way
-        effort = (self._lag.place + move + np.copysign(self._lag.slack, move) - motor) / full
+        effort = (here + move + np.copysign(slack, move) - motor) / full
         return np.asarray(min(max(effort, -1.0), 1.0) * way, np.float32)
 
     def _curve(self, place: float) -> tuple[float, float]:
@@ -130,30 +99,6 @@ class PredictiveController:
         programme = plan(self.settings.horizon, self.settings.effort)
         moves = programme(p=np.concatenate([[gain, force], goals]), lbx=-1.0, ubx=1.0)["x"]
         return float(moves[0])
-
-
-def seen_cables(observation: Observation, robot: Any) -> np.ndarray:
-    """Displacements of the cables when the nodes were seen, ``(cables,)`` [mm]: a cable runs straight between holes."""
-    if "frames" not in observation:
-        scale = max(robot.lengths_mm)
-        length = float(observation["length"][0]) * scale if "length" in observation else robot.length_mm
-        nodes = observation["nodes"].astype(float).reshape(-1, 3)
-        angles = np.pi * nodes[:, 2]
-        holes = scale * nodes[:, :2] + robot.offset_mm * np.column_stack([np.cos(angles), np.sin(angles)])
-        return np.array([length - _length(holes)])
-    nodes = robot.length_mm * observation["nodes"].astype(float).reshape(-1, 3)
-    first, last = np.moveaxis(observation["frames"].astype(float).reshape(-1, 2, 3), 1, 0)
-    second = np.cross(last, first)
-    displacements = []
-    for angle in (0.0, robot.angle):
-        hole = robot.offset_mm * (np.cos(angle) * first + np.sin(angle) * second)
-        pulled, opposite = (robot.length_mm - _length(nodes + side * hole) for side in (1, -1))
-        displacements.append(pulled if pulled > 0 else -opposite)
-    return np.array(displacements)
-
-
-def _length(points: np.ndarray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 @cache

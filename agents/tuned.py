@@ -40,7 +40,7 @@ class MPCSettings:
     """Steps planned."""
     effort: float = 0.05
     """Weight of squared moves, over that of the squared force they add."""
-    slope: float = 0.1
+    slope: float = 0.03
     """Force per millimetre of cable that is assumed at first [N/mm]."""
     least_slope: float = 0.005
     """Smallest slope that is believed [N/mm]."""
@@ -48,7 +48,7 @@ class MPCSettings:
     """Squared moves that the assumed slope is worth [mm²]."""
     stiffening: float = 0.4
     """Rate at which the slope is assumed to grow with the cable [1/mm]."""
-    width_mm: float = 0.3
+    width_mm: float = 0.6
     """Distance from a reading within which it counts [mm]."""
 
 
@@ -58,7 +58,7 @@ MPC = {
     "CCR/TrackForce-v0": MPCSettings(),
     "CCR/BracedPush-v0": MPCSettings(),
     "CCR/SoftObstacle-v0": MPCSettings(),
-    "CCR/InsertAndPush-v0": MPCSettings(slope=0.3),
+    "CCR/InsertAndPush-v0": MPCSettings(slope=0.1),
     "CCR/SpatialPush-v0": MPCSettings(),
 }
 

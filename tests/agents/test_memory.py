@@ -6,17 +6,19 @@ from gymnasium import spaces
 from agents.memory import DECAYS, MOVES, Memory, MemoryVecEnv
 from agents.sb3_adapter import FleetVecEnv
 from ccr_gym import ENV_IDS
+from ccr_gym.settings import Settings
 
 
 def memory():
-    sizes = {"cable": 1, "contact": 2, "desired_force": 1, "force_est": 2, "force_measured": 2}
+    sizes = {"cable": 1, "contact": 2, "desired_force": 1, "force_est": 2, "force_measured": 2, "nodes": 3 * 19}
     space = spaces.Dict({key: spaces.Box(-1.0, 1.0, (size,)) for key, size in sizes.items()})
-    return Memory(space, 1), sum(sizes.values())
+    return Memory(space, 1, Settings()), sum(sizes.values())
 
 
 def seen(cable=0.0, touching=False, measured=(0.0, 0.0), estimate=(0.0, 0.0), desired=0.2):
     rows = {"cable": [cable], "contact": [touching, False], "desired_force": [desired]}
-    rows |= {"force_est": estimate, "force_measured": measured}
+    straight = np.column_stack([np.zeros(19), np.linspace(0, 1, 19), np.zeros(19)]).ravel()
+    rows |= {"force_est": estimate, "force_measured": measured, "nodes": straight}
     return {key: np.array([row], np.float32) for key, row in rows.items()}
 
 
@@ -48,8 +50,9 @@ def test_errors_fade_at_their_rates_and_moves_pass_by():
     fading = np.array(DECAYS)[:, None]
     assert errors[0] == pytest.approx((1 - fading) * errors[0][0])
     assert errors[1] == pytest.approx(fading * errors[0], abs=1e-5)  # there is no error now
-    moves = last[start + 4 + 2 * len(DECAYS) :]
+    moves, (latency, slack, unseen, behind) = np.split(last[start + 4 + 2 * len(DECAYS) :], [MOVES])
     assert moves == pytest.approx([2.8] + [0] * (MOVES - 1), abs=1e-6)
+    assert (latency, unseen, behind) == (pytest.approx(1), pytest.approx(1.4 - slack), pytest.approx(-slack))
     remembers.forget()
     assert np.array_equal(remembers.recall(shown[0])[0], first)
 
@@ -59,7 +62,7 @@ def test_vectors_remember_as_single_environments_do(env_id):
     told = {"sensing": "realistic", "split": "train"}
     envs = MemoryVecEnv(FleetVecEnv(env_id, 2, 5, obs_mode="dict", **told))
     env = gymnasium.make(env_id, disable_env_checker=True, **told)
-    alone, generator = Memory(env.observation_space, 1), np.random.default_rng(0)
+    alone, generator = Memory(env.observation_space, 1, env.unwrapped.settings), np.random.default_rng(0)
     rows, (observation, _) = envs.reset(), env.reset(seed=6)
     assert envs.observation_space.contains(rows[0])
     ends = 0

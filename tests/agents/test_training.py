@@ -125,7 +125,7 @@ def test_a_foreign_file_is_refused(tmp_path):
 def test_an_observation_of_another_environment_is_refused():
     policy = LearnedPolicy(trained("Distilled", "CCR/PushObstacle-v0")[0])
     env = gymnasium.make("CCR/BracedPush-v0", sensing="realistic", disable_env_checker=True)
-    with pytest.raises(ValueError, match=r"those of CCR/PushObstacle-v0 with realistic sensing"):
+    with pytest.raises(ValueError, match=r"those of CCR/PushObstacle-v0 with realistic sensing are"):
         policy.act(env.reset(seed=0)[0])
 
 
