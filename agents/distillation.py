@@ -38,7 +38,7 @@ def teach(envs: Any, observation: Observation) -> np.ndarray:
     settings, body = envs.get_attr("settings", [0])[0], envs.get_attr("task", [0])[0].body
     way = search(observation).astype(float)
     force = np.linalg.norm(truth.force, axis=1)
-    tried = envs.env_method("probe", truth.places + PROBE_MM * way, indices=[0])[0]
+    tried = np.linalg.norm(envs.env_method("probe", truth.places + PROBE_MM * way, indices=[0])[0], axis=1)
     slope = np.maximum(np.abs(tried - force) / PROBE_MM, LEAST_SLOPE)
     lacking = np.where(np.abs(truth.goal - force) < REACHED_N, 0.0, truth.goal - force)
     moves = (lacking / slope)[:, None] * way

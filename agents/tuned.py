@@ -53,13 +53,27 @@ class MPCSettings:
 
 
 MPC = {
-    "CCR/LoadCell-v0": MPCSettings(),
-    "CCR/PushObstacle-v0": MPCSettings(),
-    "CCR/TrackForce-v0": MPCSettings(),
-    "CCR/BracedPush-v0": MPCSettings(),
-    "CCR/SoftObstacle-v0": MPCSettings(),
-    "CCR/InsertAndPush-v0": MPCSettings(slope=0.1),
-    "CCR/SpatialPush-v0": MPCSettings(),
+    "CCR/LoadCell-v0": MPCSettings(
+        effort=0.44, slope=0.032, least_slope=0.022, trust=0.0016, stiffening=0.11, width_mm=0.14
+    ),
+    "CCR/PushObstacle-v0": MPCSettings(
+        effort=0.012, slope=0.011, least_slope=0.088, trust=0.0017, stiffening=0.69, width_mm=0.11
+    ),
+    "CCR/TrackForce-v0": MPCSettings(
+        effort=0.061, slope=0.028, least_slope=0.0063, trust=0.0022, stiffening=0.71, width_mm=0.21
+    ),
+    "CCR/BracedPush-v0": MPCSettings(
+        effort=1.1, slope=0.036, least_slope=0.046, trust=0.001, stiffening=0.68, width_mm=0.073
+    ),
+    "CCR/SoftObstacle-v0": MPCSettings(
+        effort=0.015, slope=0.03, least_slope=0.05, trust=0.0026, stiffening=0.16, width_mm=0.22
+    ),
+    "CCR/InsertAndPush-v0": MPCSettings(
+        effort=0.03, slope=0.025, least_slope=0.0056, trust=0.0083, stiffening=0.21, width_mm=0.41
+    ),
+    "CCR/SpatialPush-v0": MPCSettings(
+        effort=0.24, slope=0.021, least_slope=0.0012, trust=0.0076, stiffening=0.26, width_mm=0.19
+    ),
 }
 
 

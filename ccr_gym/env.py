@@ -120,6 +120,10 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         """What no agent sees."""
         return self._fleet.truth(0)
 
+    def probe(self, places: np.ndarray) -> np.ndarray:
+        """Force on the robot that counts, ``(d,)`` [N], if what the actions move were elsewhere ``(actions,)`` [mm]."""
+        return np.asarray(self._fleet.probe(places[None])[0])
+
     def _observation(self, reading: Reading) -> Observation:
         row = self._fleet.observe(reading, 0)
         return row if self.settings.obs_mode == "flat" else self._fleet.observer.entries(row)

@@ -235,7 +235,7 @@ class Fleet:
         return Truth(force, stiffness, goal, places, senses.motors(which), senses.slack(which))
 
     def probe(self, places: np.ndarray) -> np.ndarray:
-        """Magnitudes of the forces that all robots would feel, ``(N,)`` [N], if what their motors move were elsewhere.
+        """Forces that all robots would feel, ``(N, d)`` [N], if what their motors move were elsewhere.
 
         Args:
             places: Where, ``(N, actions)`` [mm], cut to what is possible; nothing moves.
@@ -244,7 +244,7 @@ class Fleet:
         places = np.clip(places, *self.body.bounds(self._settings))
         commands[:, self.body.place] = places.reshape(commands[:, self.body.place].shape)
         forces = self._forces(self.solver.probe(commands))
-        return np.asarray(_norm(forces)) * (1.0 if self._senses is None else self._senses.stiffness)
+        return forces * (1.0 if self._senses is None else self._senses.stiffness[:, None])
 
     def _forces(self, blocks: np.ndarray) -> np.ndarray:
         """Contact forces that count, of a robot of the known rigidity, ``(..., d)`` [N]."""

@@ -81,7 +81,8 @@ def test_the_truth_of_many_is_that_of_each_and_trying_a_move_tells_its_force(env
         envs.step(actions)
         for env, action in zip(singles, actions, strict=True):
             env.step(action)
-        assert envs.probe(envs.truth.places) == pytest.approx(np.linalg.norm(envs.truth.force, axis=1), abs=1e-6)
+        assert envs.probe(envs.truth.places) == pytest.approx(envs.truth.force, abs=1e-6)
+        assert singles[0].probe(singles[0].truth.places) == pytest.approx(singles[0].truth.force, abs=1e-6)
 
 
 def test_backlash_is_taken_up_before_anything_moves():
