@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from agents import training
-from agents.actor import ACTOR, LearnedPolicy
+from agents.actor import ACTOR, CLIP, EPSILON, LearnedPolicy, Network, export
 from agents.config import TrainConfig
 from agents.learners import KINDS, environments
 from agents.suite import trained
@@ -30,20 +30,27 @@ def few_validation_episodes(monkeypatch):
 
 @pytest.mark.parametrize("name", sorted(SMALL))
 def test_the_actor_acts_as_the_learner_does(name, tmp_path, monkeypatch):
-    kept = []
-    monkeypatch.setattr(
-        training, "export", lambda path, policy, *rest: kept.append((policy, rest[0])) or export(path, policy, *rest)
-    )
-    export = __import__("agents.actor", fromlist=["export"]).export
+    kept = {}
+
+    def keep(path, network, statistics, *rest):
+        kept["statistics"] = statistics
+        export(path, network, statistics, *rest)
+
+    def of(policy, settings):
+        kept["policy"] = policy
+        return make(policy, settings)
+
+    make = Network.of
+    monkeypatch.setattr(training, "export", keep)
+    monkeypatch.setattr(training.Network, "of", of)
     config = TrainConfig(run=tmp_path, learner=SMALL[name], threads=1)
     actor = LearnedPolicy(train(config, progress=False))
-    (policy, normalizer), rows = kept[0], environments(config, 1, 7)
-    normalizer.training = False
+    policy, statistics, rows = kept["policy"], kept["statistics"], environments(config, 1, 7)
     env = gymnasium.make(config.env_id, disable_env_checker=True, sensing=config.sensing, split="train")
     observation, _ = env.reset(seed=7)
     seen, state = rows.reset(), None
     for step in range(20):
-        scaled = normalizer.normalize_obs(seen)
+        scaled = np.clip((seen - statistics.mean) / np.sqrt(statistics.var + EPSILON), -CLIP, CLIP).astype(np.float32)
         theirs, state = policy.predict(scaled, state, np.array([step == 0]), deterministic=True)
         action = actor.act(observation)
         assert env.action_space.contains(action)
@@ -124,7 +131,7 @@ def test_a_foreign_file_is_refused(tmp_path):
 
 def test_an_observation_of_another_environment_is_refused():
     policy = LearnedPolicy(trained("Distilled", "CCR/PushObstacle-v0")[0])
-    env = gymnasium.make("CCR/BracedPush-v0", sensing="realistic", disable_env_checker=True)
+    env = gymnasium.make("CCR/TrackForce-v0", sensing="realistic", disable_env_checker=True)
     with pytest.raises(ValueError, match=r"those of CCR/PushObstacle-v0 with realistic sensing are"):
         policy.act(env.reset(seed=0)[0])
 
