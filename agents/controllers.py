@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy import Observation, search
+from agents.policy import Observation, Tare, search
 from agents.tuned import P_GAINS, PI_GAINS
 from ccr_gym.observation import FORCE_SCALE_N
 
@@ -27,7 +27,7 @@ class ForceController:
     integral: float = 20.0
     name: str = "PI"
     _last: float | None = field(default=None, init=False)
-    _readings: list[np.ndarray] = field(default_factory=list, init=False)
+    _tare: Tare = field(default_factory=Tare, init=False)
 
     @classmethod
     def tuned(cls, env_id: str) -> "ForceController":
@@ -42,22 +42,16 @@ class ForceController:
     def reset(self, env: Any = None) -> None:
         """Forget the last error, and what the sensor read."""
         self._last = None
-        self._readings.clear()
+        self._tare.forget()
 
     def act(self, observation: Observation) -> np.ndarray:
         """Pull until something touches, then control the force."""
-        if not observation["contact"].any():
+        force = self._tare.force(observation)
+        if force is None:
             self._last = None
-            self._readings.append(observation["force_measured"])
             return search(observation)
-        error = self._lacking(observation)
+        error = FORCE_SCALE_N * float(np.linalg.norm(observation["desired_force"])) - float(np.linalg.norm(force))
         change = 0.0 if self._last is None else error - self._last
         self._last = error
         effort = min(max(self.proportional * change + self.integral * error, -1.0), 1.0)
         return np.asarray(effort * search(observation), np.float32)
-
-    def _lacking(self, observation: Observation) -> float:
-        """How much the force is smaller than its set-point [N]."""
-        tare = np.mean(self._readings, axis=0) if self._readings else 0.0
-        measured = np.linalg.norm(observation["force_measured"].astype(float) - tare)
-        return float(np.linalg.norm(observation["desired_force"]) - measured) * FORCE_SCALE_N

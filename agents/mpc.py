@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from agents.lag import Lag, seen_cables
-from agents.policy import Observation, search
+from agents.policy import Observation, Tare, search
 from agents.tuned import MPC, MPCSettings
 from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 
@@ -33,7 +33,7 @@ class PredictiveController:
     name: str = "MPC"
     _env: Any = field(default=None, init=False)
     _lag: Lag = field(default_factory=lambda: Lag(1, 1), init=False)
-    _free: list[np.ndarray] = field(default_factory=list, init=False)
+    _tare: Tare = field(default_factory=Tare, init=False)
     _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
 
     @classmethod
@@ -44,7 +44,7 @@ class PredictiveController:
     def reset(self, env: Any = None) -> None:
         """Forget the episode; the robot and the range of its motors are those of the environment."""
         self._env, self._lag = env, Lag(1, 1)
-        self._free.clear()
+        self._tare.forget()
         self._readings.clear()
 
     def act(self, observation: Observation) -> np.ndarray:
@@ -55,12 +55,10 @@ class PredictiveController:
         place = float(seen_cables(observation, settings.robot) @ along)
         self._lag.see(np.array([[motor]]), np.array([[place]]))
         here, slack = self._lag.places.item(), self._lag.slack.item()
-        measured = FORCE_SCALE_N * observation["force_measured"].astype(float)
-        if not observation["contact"].any():
-            self._free.append(measured)
+        measured = self._tare.force(observation)
+        if measured is None:
             return way
-        zero = np.mean(self._free, axis=0) if self._free else 0.0
-        self._readings.append((place, float(np.linalg.norm(measured - zero))))
+        self._readings.append((place, float(np.linalg.norm(measured))))
         force, slope = self._curve(here)
         full = settings.max_increment_mm
         move = full * self._plan(max(slope, self.settings.least_slope) * full, force, self._goals(observation))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy import Observation, search
+from agents.policy import Observation, Tare, search
 from agents.tuned import NEWTON_GAINS
 from ccr_gym.fleet import Truth
 from ccr_gym.observation import FORCE_SCALE_N
@@ -38,7 +38,7 @@ class NewtonController:
     damping: float = 1e-4
     name: str = "Newton"
     _env: Any = field(default=None, init=False)
-    _readings: list[np.ndarray] = field(default_factory=list, init=False)
+    _tare: Tare = field(default_factory=Tare, init=False)
 
     @classmethod
     def tuned(cls, env_id: str) -> "NewtonController":
@@ -53,7 +53,7 @@ class NewtonController:
     def reset(self, env: Any = None) -> None:
         """Take the environment whose equilibrium is known."""
         self._env = env
-        self._readings.clear()
+        self._tare.forget()
 
     def act(self, observation: Observation) -> np.ndarray:
         """Pull until something touches, then step to where the force is that of the set-point."""
@@ -81,12 +81,9 @@ class NewtonController:
 
     def _seen(self, observation: Observation, truth: Truth) -> Truth:
         """What it takes for the truth if it does not know what is hidden; no force while nothing is seen to touch."""
-        force, goal = (FORCE_SCALE_N * observation[key].astype(float) for key in ("force_measured", "desired_force"))
-        if not observation["contact"].any():
-            self._readings.append(force)
-            force = np.zeros(force.size)
-        elif self._readings:
-            force = force - np.mean(self._readings, axis=0)
+        force, goal = self._tare.force(observation), FORCE_SCALE_N * observation["desired_force"].astype(float)
+        if force is None:
+            force = np.zeros(truth.force.size)
         here, still = truth.motors, np.zeros(truth.motors.size)
         return Truth(force, 1.0, goal.item() if goal.size == 1 else goal, here, here, still)
 

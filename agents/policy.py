@@ -5,6 +5,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ccr_gym.observation import FORCE_SCALE_N
+
 Observation = dict[str, np.ndarray]
 
 
@@ -35,3 +37,22 @@ def search(observation: Observation, angle: float = math.pi / 2) -> np.ndarray:
     azimuth = np.arctan2(observation["obstacle"][..., 1], observation["obstacle"][..., 0])
     pull = np.stack([np.cos(azimuth), np.cos(azimuth - angle)], axis=-1)
     return np.asarray(pull / np.abs(pull).max(axis=-1, keepdims=True), np.float32)
+
+
+class Tare:
+    """The force sensor with its zero taken off: the mean of what it reads while nothing touches."""
+
+    def __init__(self) -> None:
+        self._readings: list[np.ndarray] = []
+
+    def forget(self) -> None:
+        """Begin a new episode."""
+        self._readings.clear()
+
+    def force(self, observation: Observation) -> np.ndarray | None:
+        """The measured force, ``(d,)`` [N]; ``None`` while nothing is seen to touch, which tells the zero."""
+        measured = FORCE_SCALE_N * observation["force_measured"].astype(float)
+        if not observation["contact"].any():
+            self._readings.append(measured)
+            return None
+        return measured - np.mean(self._readings, axis=0) if self._readings else measured

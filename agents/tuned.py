@@ -78,10 +78,10 @@ MPC = {
 
 
 @dataclass(frozen=True, slots=True)
-class PPOSettings:
-    """Proximal policy optimisation, on observations with a memory."""
+class OnPolicySettings:
+    """What both kinds of proximal policy optimisation are told."""
 
-    name: ClassVar[str] = "PPO"
+    name: ClassVar[str]
 
     steps: int = 600_000
     """Environment steps to train for."""
@@ -102,38 +102,31 @@ class PPOSettings:
     log_std_init: float = -0.5
     """Logarithm of the first exploration noise."""
     width: int = 64
-    """Units in each of the two hidden layers."""
+    """Units in each hidden layer: two, or one behind an LSTM."""
+
+
+@dataclass(frozen=True, slots=True)
+class PPOSettings(OnPolicySettings):
+    """Proximal policy optimisation, on observations with a memory."""
+
+    name: ClassVar[str] = "PPO"
 
 
 PPO_IDEAL = PPOSettings(steps=160_000, envs=32, rollout=64, batch_size=512)  # enough where sensing is ideal
 
 
 @dataclass(frozen=True, slots=True)
-class RecurrentPPOSettings:
-    """The same with an LSTM in the place of the memory."""
+class RecurrentPPOSettings(OnPolicySettings):
+    """Proximal policy optimisation with an LSTM in the place of the memory."""
 
     name: ClassVar[str] = "RecurrentPPO"
 
     steps: int = 200_000
     """Environment steps to train for."""
-    envs: int = 64
-    """Environments stepped side by side."""
     rollout: int = 64
     """Steps of each environment between updates."""
     batch_size: int = 1024
     """Samples of one gradient step."""
-    epochs: int = 8
-    """Passes over a rollout."""
-    learning_rate: float = 1e-3
-    """Of Adam, decaying linearly to zero."""
-    gamma: float = 0.9
-    """Discount of rewards."""
-    gae_lambda: float = 0.9
-    """Decay of advantages."""
-    log_std_init: float = -0.5
-    """Logarithm of the first exploration noise."""
-    width: int = 64
-    """Units in the hidden layer behind the LSTM."""
     hidden: int = 32
     """Units of the LSTM."""
 
