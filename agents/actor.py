@@ -4,7 +4,7 @@ One file holds all of it: tensors in half precision and text, no code. Neither t
 """
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,21 @@ class Curve:
 
     steps: tuple[int, ...]
     returns: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """How a policy was made.
+
+    Attributes:
+        config: Of the run, without its folder.
+        curve: Its learning curve.
+        seconds: What it took [s].
+    """
+
+    config: TrainConfig
+    curve: Curve
+    seconds: float
 
 
 class Network(nn.Module):
@@ -90,26 +105,32 @@ class Network(nn.Module):
         return network
 
 
-def export(
-    path: Path, network: Network, seen: RunningMeanStd, config: TrainConfig, curve: Curve, seconds: float
-) -> None:
+def scaled(rows: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> torch.Tensor:
+    """Rows as a network takes them."""
+    return torch.as_tensor(np.clip((rows - mean) / deviation, -CLIP, CLIP), dtype=torch.float32)
+
+
+def deviation(seen: RunningMeanStd) -> np.ndarray:
+    """What rows are divided by."""
+    return np.asarray(np.sqrt(seen.var + EPSILON))
+
+
+def export(path: Path, network: Network, seen: RunningMeanStd, training: Training) -> None:
     """Write an actor.
 
     Args:
         path: Of its file.
         network: Trained on scaled rows.
         seen: Mean and variance that rows are scaled by.
-        config: Of the run.
-        curve: Its learning curve.
-        seconds: Time of training [s].
+        training: How it was made.
     """
-    told = {"steps": curve.steps, "returns": curve.returns, "seconds": seconds}
+    told = {**asdict(training.curve), "seconds": training.seconds}
     written = {
         "format": FORMAT,
-        "config": replace(config, run=Path()).dumps(),
+        "config": replace(training.config, run=Path()).dumps(),
         "training": json.dumps(told),
         "mean": torch.tensor(seen.mean, dtype=torch.float32),
-        "deviation": torch.tensor(np.sqrt(seen.var + EPSILON), dtype=torch.float32),
+        "deviation": torch.tensor(deviation(seen), dtype=torch.float32),
         "weights": {name: value.half() for name, value in network.state_dict().items()},
     }
     partial = path.with_suffix(".partial")
@@ -125,9 +146,7 @@ class LearnedPolicy:
 
     Attributes:
         name: Of the learner.
-        config: Of the run, without its folder.
-        curve: Its learning curve.
-        seconds: Time of training [s].
+        training: How it was made.
 
     Raises:
         FileNotFoundError: If there is no such file.
@@ -142,22 +161,21 @@ class LearnedPolicy:
             read = torch.load(path, weights_only=True)
             if read["format"] != FORMAT:
                 raise ValueError(f"its format is {read['format']}; this version reads {FORMAT}: train it anew")
-            self.config = TrainConfig.loads(read["config"])
-            training = json.loads(read["training"])
-            self.curve = Curve(tuple(training["steps"]), tuple(training["returns"]))
-            self.seconds = float(training["seconds"])
+            config, told = TrainConfig.loads(read["config"]), json.loads(read["training"])
+            curve = Curve(tuple(told["steps"]), tuple(told["returns"]))
+            self.training = Training(config, curve, float(told["seconds"]))
             self._mean, self._deviation = read["mean"].numpy(), read["deviation"].numpy()
             weights = {name: value.float() for name, value in read["weights"].items()}
             actions = len(weights[list(weights)[-1]])
-            self._network = Network(self._mean.size, actions, self.config.learner)
+            self._network = Network(self._mean.size, actions, config.learner)
             self._network.load_state_dict(weights)
         except Exception as error:
             raise ValueError(f"{path} is not a trained policy: {error!r}") from error
-        self.name = self.config.learner.name
-        env = gymnasium.make(self.config.env_id, sensing=self.config.sensing, disable_env_checker=True)
+        self.name = config.learner.name
+        env = gymnasium.make(config.env_id, sensing=config.sensing, disable_env_checker=True)
         assert isinstance(env.observation_space, spaces.Dict)
         self._sizes = {key: box.shape for key, box in env.observation_space.items()}
-        recurrent = isinstance(self.config.learner, RecurrentPPOSettings)
+        recurrent = isinstance(config.learner, RecurrentPPOSettings)
         self._memory = None if recurrent else Memory(env.observation_space, 1, env.get_wrapper_attr("settings"))
         self._state: Any = None
 
@@ -175,11 +193,10 @@ class LearnedPolicy:
         """
         sizes = {key: value.shape for key, value in observation.items()}
         if sizes != self._sizes:
-            trained = f"{self.config.env_id} with {self.config.sensing} sensing"
+            trained = f"{self.training.config.env_id} with {self.training.config.sensing} sensing"
             raise ValueError(f"the observation has the shapes {sizes}; those of {trained} are {self._sizes}")
         rows = {key: value[None] for key, value in observation.items()}
         row = np.concatenate(list(rows.values()), axis=1) if self._memory is None else self._memory.recall(rows)
-        row = np.clip((row - self._mean) / self._deviation, -CLIP, CLIP)
         with torch.no_grad():
-            action, self._state = self._network(torch.from_numpy(row.astype(np.float32)), self._state)
+            action, self._state = self._network(scaled(row, self._mean, self._deviation), self._state)
         return np.asarray(action[0].numpy())

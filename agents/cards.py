@@ -3,7 +3,6 @@
 import textwrap
 from dataclasses import asdict
 
-from agents.actor import LearnedPolicy
 from agents.config import EvaluateConfig
 from agents.suite import Result
 from ccr_gym.sensing import Sensing
@@ -20,9 +19,9 @@ ABOUT = {
 def card(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:
     """What a trained policy is, how it was made, what it achieves and where it ends."""
     entry, summary = result.entry, result.summary
-    first = LearnedPolicy(entry.files[0])
-    settings = ", ".join(f"{name} {value:g}" for name, value in asdict(first.config.learner).items())
-    seeds = ", ".join(f"{LearnedPolicy(file).config.seed}" for file in entry.files)
+    learner = result.trainings[0].config.learner
+    settings = ", ".join(f"{name} {value:g}" for name, value in asdict(learner).items())
+    seeds = ", ".join(str(training.config.seed) for training in result.trainings)
     ranges = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in asdict(Sensing()).items())
     low, high = summary["rmse_interval_mn"]
     others = "; ".join(f"{r.entry.policy} {r.summary['rmse_iqm_mn']:.2f}" for r in rivals if r is not result)

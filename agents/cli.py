@@ -61,7 +61,10 @@ def retrain(config: RetrainConfig) -> None:
     """Train every learned baseline on every environment, as the shipped policies were."""
     from agents.retrain import retrain as run
 
-    run(config)
+    try:
+        run(config)
+    except ValueError as error:
+        raise SystemExit(str(error)) from error
 
 
 def sweep(config: SweepConfig) -> None:

@@ -15,7 +15,7 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import nn
 from torch.utils.tensorboard import SummaryWriter
 
-from agents.actor import CLIP, EPSILON, Curve, Network
+from agents.actor import EPSILON, Curve, Network, deviation, scaled
 from agents.config import VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
 from agents.learners import environments
 from agents.policy import Observation, search
@@ -60,8 +60,7 @@ class Student:
 
     def scaled(self, rows: np.ndarray) -> torch.Tensor:
         """Rows as the network takes them."""
-        away = (rows - self.seen.mean) / np.sqrt(self.seen.var + EPSILON)
-        return torch.as_tensor(np.clip(away, -CLIP, CLIP), dtype=torch.float32)
+        return scaled(rows, self.seen.mean, deviation(self.seen))
 
     def predict(self, rows: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True) -> Any:
         """Actions for rows, ``(N, actions)``."""

@@ -12,7 +12,6 @@ from agents.cards import card
 from agents.config import EvaluateConfig
 from agents.figures import draw_curves, draw_episodes, draw_profiles, draw_scores
 from agents.suite import Result, folder_name
-from agents.tuned import LEARNERS
 
 NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
 WIDTH = 190  # of a printed table
@@ -43,7 +42,7 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
     by_id = group(results)
     (config.out / "evaluation.md").write_text(f"{matrix(by_id)}\n{markdown(by_id)}")
     for result in results:
-        if result.entry.policy in LEARNERS:
+        if result.trainings:
             folder = config.out / "cards" / result.entry.policy / folder_name(result.entry.env_id)
             folder.mkdir(parents=True, exist_ok=True)
             (folder / "README.md").write_text(card(result, by_id[result.entry.env_id], config))
@@ -133,4 +132,4 @@ def show(by_id: dict[str, list[Result]]) -> None:
 
 
 def _curves(results: list[Result]) -> dict[str, list[Any]]:
-    return {r.entry.policy: [p.curve for p in r.entry.load()] for r in results if r.entry.policy in LEARNERS}  # type: ignore[attr-defined]
+    return {r.entry.policy: [training.curve for training in r.trainings] for r in results if r.trainings}

@@ -1,8 +1,7 @@
 """Training of all learned baselines, several runs side by side."""
 
-import multiprocessing
 import shutil
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import replace
 
 from rich.progress import track
@@ -10,8 +9,9 @@ from rich.progress import track
 from agents.actor import ACTOR
 from agents.config import RetrainConfig, TrainConfig
 from agents.suite import folder_name
-from agents.training import train
+from agents.training import CONFIG, train
 from agents.tuned import LEARNERS
+from agents.workers import workers
 
 
 def runs(config: RetrainConfig) -> list[TrainConfig]:
@@ -31,12 +31,22 @@ def runs(config: RetrainConfig) -> list[TrainConfig]:
     ]
 
 
+def _done(run: TrainConfig) -> bool:
+    path = run.run / CONFIG
+    if path.is_file() and replace(TrainConfig.load(path), run=run.run) != run:
+        raise ValueError(f"{run.run} holds a run with other settings; give another folder, or remove it")
+    return (run.run / ACTOR).is_file()
+
+
 def retrain(config: RetrainConfig) -> None:
-    """Train what is not trained yet, and put the actors where :mod:`agents.suite` finds shipped ones, in ``out``."""
+    """Train what is not trained yet, and put the actors where :mod:`agents.suite` finds shipped ones, in ``out``.
+
+    Raises:
+        ValueError: If a run is there with other settings; all are left as they are.
+    """
     asked = runs(config)
-    missing = [run for run in asked if not (run.run / ACTOR).is_file()]
-    context = multiprocessing.get_context("spawn")  # torch does not bear being forked
-    with ProcessPoolExecutor(config.jobs, mp_context=context) as pool:
+    missing = [run for run in asked if not _done(run)]
+    with workers(config.jobs) as pool:
         waiting = [pool.submit(train, run, False) for run in missing]
         for future in track(as_completed(waiting), "retrain", len(waiting)):
             future.result()

@@ -1,17 +1,14 @@
 """The benchmark: every policy on every environment, on the same test scenes."""
 
-import multiprocessing
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
-from agents.actor import LearnedPolicy
+from agents.actor import LearnedPolicy, Training
 from agents.config import PRETRAINED, EvaluateConfig
 from agents.controllers import ForceController
 from agents.evaluate import METRICS, Episode, measure, run_episode
@@ -21,6 +18,7 @@ from agents.policy import Policy
 from agents.statistics import cvar, iqm, iqm_interval
 from agents.tuned import LEARNERS
 from agents.video import record
+from agents.workers import workers
 from solver import Status
 
 SHOWN = 4  # first episodes that are kept for figures
@@ -65,12 +63,14 @@ class Result:
         metrics: Of every training seed and episode, ``(seeds, episodes)`` each, by name.
         summary: The numbers of a table, as :func:`summarize` gives them.
         shown: First episodes of the first training seed.
+        trainings: How the policy of every training seed was made; none for a controller.
     """
 
     entry: Entry
     metrics: dict[str, np.ndarray]
     summary: dict[str, Any]
     shown: tuple[Episode, ...] = ()
+    trainings: tuple[Training, ...] = ()
 
     @property
     def rmse(self) -> np.ndarray:
@@ -116,7 +116,8 @@ def entries(config: EvaluateConfig) -> list[Entry]:
     found: dict[tuple[str, str, str], list[Path]] = {}
     for run in config.runs:
         learned = LearnedPolicy(run)
-        found.setdefault((learned.config.env_id, learned.config.sensing, learned.name), []).append(run)
+        trained_as = learned.training.config
+        found.setdefault((trained_as.env_id, trained_as.sensing, learned.name), []).append(run)
     played = [Entry(name, env_id, sensing, tuple(files)) for (env_id, sensing, name), files in found.items()]
     for env_id, sensing in dict.fromkeys((entry.env_id, entry.sensing) for entry in played):
         played += [Entry(name, env_id, sensing) for name in config.policies if name not in LEARNERS]
@@ -135,7 +136,6 @@ def folder_name(env_id: str) -> str:
 
 def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> Result:
     """Play an entry's episodes, of consecutive seeds; record the first to a video if asked for."""
-    torch.set_num_threads(1)
     told = {"sensing": entry.sensing, "split": "test"}
     policies, shown, rows = entry.load(), [], []
     statuses: Counter[str] = Counter()
@@ -153,18 +153,18 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
         record(policies[0], entry.env_id, seed, 1, video, **told)
     table = np.array(rows).reshape(len(policies), episodes, len(METRICS))
     metrics = {name: table[..., k] for k, name in enumerate(METRICS)}
+    trainings = tuple(policy.training for policy in policies if isinstance(policy, LearnedPolicy))
     summary = summarize(metrics) | {
         "statuses": {status.name: statuses[status.name] for status in Status if statuses[status.name]},
         "decisions_per_second": steps / max(seconds, 1e-9),
-        "training_seconds": float(np.mean([getattr(policy, "seconds", 0.0) for policy in policies])),
+        "training_seconds": float(np.mean([training.seconds for training in trainings])) if trainings else 0.0,
     }
-    return Result(entry, metrics, summary, tuple(shown))
+    return Result(entry, metrics, summary, tuple(shown), trainings)
 
 
 def play_all(config: EvaluateConfig, played: list[Entry]) -> Iterator[Result]:
     """Play entries on several processes, and give their results as they come."""
-    context = multiprocessing.get_context("spawn")  # torch does not bear being forked
-    with ProcessPoolExecutor(config.jobs, mp_context=context) as pool:
+    with workers(config.jobs) as pool:
         waiting = []
         for entry in sorted(
             played, key=lambda entry: (entry.policy not in ("Newton", "Oracle"), "Spatial" not in entry.env_id)

@@ -13,7 +13,7 @@ from agents.mpc import PredictiveController
 from agents.newton import NewtonController
 from agents.policy import Policy
 from agents.statistics import iqm
-from agents.tuned import LEARNERS, LearnerSettings, MPCSettings, PPOSettings, RecurrentPPOSettings, SACSettings
+from agents.tuned import LEARNERS, DistilledSettings, LearnerSettings, MPCSettings, RecurrentPPOSettings, SACSettings
 
 
 def sweep(config: SweepConfig) -> optuna.Study:
@@ -74,10 +74,17 @@ def _trained(trial: optuna.Trial, config: SweepConfig) -> Policy:
 def _settings(trial: optuna.Trial, base: LearnerSettings) -> LearnerSettings:
     common: dict[str, Any] = {
         "learning_rate": trial.suggest_float("learning_rate", 1e-4, 3e-3, log=True),
-        "gamma": 1 - trial.suggest_float("1 - gamma", 0.01, 0.2, log=True),
         "batch_size": trial.suggest_categorical("batch_size", [256, 512, 1024, 2048]),
         "width": trial.suggest_categorical("width", [32, 64, 128]),
     }
+    if isinstance(base, DistilledSettings):
+        return replace(
+            base,
+            **common,
+            gradient_steps=trial.suggest_categorical("gradient_steps", [200, 400, 800]),
+            huber=trial.suggest_float("huber", 0.02, 1.0, log=True),
+        )
+    common["gamma"] = 1 - trial.suggest_float("1 - gamma", 0.01, 0.2, log=True)
     if isinstance(base, SACSettings):
         return replace(
             base,
@@ -93,5 +100,4 @@ def _settings(trial: optuna.Trial, base: LearnerSettings) -> LearnerSettings:
     }
     if isinstance(base, RecurrentPPOSettings):
         common["hidden"] = trial.suggest_categorical("hidden", [16, 32, 64])
-    assert isinstance(base, PPOSettings | RecurrentPPOSettings)
     return replace(base, **common)

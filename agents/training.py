@@ -13,7 +13,7 @@ from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.actor import ACTOR, Curve, Network, export
+from agents.actor import ACTOR, Curve, Network, Training, export
 from agents.config import VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
 from agents.distillation import distill
 from agents.learners import KINDS, environments, learner, scaled
@@ -36,7 +36,7 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
     last = _last_checkpoint(config)
     if isinstance(config.learner, DistilledSettings):
         network, seen, curve = distill(config, config.learner, progress)
-        export(config.run / ACTOR, network, seen, config, curve, time.perf_counter() - started)
+        export(config.run / ACTOR, network, seen, Training(config, curve, time.perf_counter() - started))
         return config.run
     model, spent = _resumed(config, last) if last else (_fresh(config), 0.0)
     keep = Checkpoints(config, lambda: spent + time.perf_counter() - started)
@@ -53,7 +53,7 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
     assert isinstance(normalizer.obs_rms, RunningMeanStd)
     curve = Curve(tuple(validate.evaluations_timesteps), tuple(map(float, map(np.mean, validate.evaluations_results))))
     network = Network.of(model.policy, config.learner)
-    export(config.run / ACTOR, network, normalizer.obs_rms, config, curve, keep.seconds())
+    export(config.run / ACTOR, network, normalizer.obs_rms, Training(config, curve, keep.seconds()))
     normalizer.close()
     return config.run
 

@@ -330,7 +330,7 @@ def first_derivatives(problem: NodeProblem) -> ca.Function:
         problem.inequalities,
         ca.jacobian(problem.inequalities, problem.unknowns),
     ]
-    return ca.Function("first_derivatives", [problem.unknowns, problem.parameters], outputs)
+    return ca.Function("first_derivatives", [problem.unknowns, problem.parameters], outputs).expand()
 
 
 @lru_cache(maxsize=32)
@@ -365,4 +365,5 @@ def second_derivatives(problem: NodeProblem, change: ca.MX) -> ca.Function:
         ca.jacobian(loads, change),
     ]
     outputs = [ca.substitute(output, change, ca.MX.zeros(change.shape)) for output in outputs]
-    return ca.Function("kkt_derivatives", [problem.unknowns, problem.parameters, tensions, pushes], outputs)
+    inputs = [problem.unknowns, problem.parameters, tensions, pushes]
+    return ca.Function("kkt_derivatives", inputs, outputs).expand()  # to scalars, which are faster to evaluate

@@ -55,7 +55,7 @@ def test_a_student_learns(tmp_path, monkeypatch):
     config = TrainConfig(run=tmp_path, env_id="CCR/LoadCell-v0", learner=settings)
     student = LearnedPolicy(train(config, progress=False))
     assert student.name == "Distilled"
-    assert student.curve.returns[-1] > student.curve.returns[0]
+    assert student.training.curve.returns[-1] > student.training.curve.returns[0]
     told = {"sensing": "realistic", "split": "train"}
     assert np.median(scores(student, config.env_id, 300, 12, **told)) < 12  # 2 after the full training
     assert any(tmp_path.glob("log_1/events*"))

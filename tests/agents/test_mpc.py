@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from agents.controllers import ForceController
 from agents.evaluate import run_episodes, scores
 from agents.mpc import PredictiveController, plan
 from agents.tuned import MPC, MPCSettings
@@ -29,8 +30,10 @@ def test_effort_makes_it_gentler():
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
 def test_it_regulates_with_realistic_sensing(env_id):
     told = {"sensing": "realistic", "split": "train"}
-    errors = scores(PredictiveController.tuned(env_id), env_id, 50, 8, **told)
-    assert np.median(errors) < 25
+    planned, integral = (
+        scores(kind.tuned(env_id), env_id, 50, 8, **told) for kind in (PredictiveController, ForceController)
+    )
+    assert np.median(planned) < np.median(integral) / 2
 
 
 def test_it_forgets_the_episode_before():

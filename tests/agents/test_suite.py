@@ -1,18 +1,20 @@
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from agents import cli, report, suite
+from agents import cli, report, suite, training
 from agents.actor import LearnedPolicy
 from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
 from agents.evaluate import METRICS, Episode, measure, scores
 from agents.retrain import retrain
 from agents.suite import Entry, play, trained
+from agents.sweep import sweep
 from agents.training import train
-from agents.tuned import PPOSettings
+from agents.tuned import LEARNERS, PPOSettings
 from solver import Status
 
 SCORES = json.loads((PRETRAINED / "scores.json").read_text())
@@ -89,10 +91,12 @@ def test_retraining_fills_a_folder_as_that_of_the_shipped_policies(tmp_path):
     retrain(config)
     files = trained("PPO", "CCR/LoadCell-v0", tmp_path)
     assert [file.name for file in files] == ["0.pt", "1.pt"]
-    assert [LearnedPolicy(file).config.seed for file in files] == [0, 1000]
+    assert [LearnedPolicy(file).training.config.seed for file in files] == [0, 1000]
     before = [file.stat().st_mtime_ns for file in tmp_path.glob("PPO/LoadCell-v0/*/actor.pt")]
     retrain(config)
     assert [file.stat().st_mtime_ns for file in tmp_path.glob("PPO/LoadCell-v0/*/actor.pt")] == before
+    with pytest.raises(ValueError, match="a run with other settings"):
+        retrain(replace(config, share=1.0))
 
 
 def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
@@ -101,6 +105,20 @@ def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
     cli.main()
     cli.main()
     assert "Best of 4" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("learner", sorted(LEARNERS))
+def test_a_sweep_finds_settings_of_every_learner(learner, tmp_path, monkeypatch):
+    def instead(config, progress):
+        tried.append(config.learner)
+        return trained("Distilled", "CCR/LoadCell-v0")[0]
+
+    tried = []
+    monkeypatch.setattr(training, "train", instead)
+    config = SweepConfig(what=learner, env_id="CCR/LoadCell-v0", trials=2, episodes=1, steps=640, out=tmp_path)
+    sweep(config)
+    assert [(settings.name, settings.steps) for settings in tried] == [(learner, 640)] * 2
+    assert tried[0] != tried[1]
 
 
 @pytest.mark.parametrize(
@@ -142,8 +160,8 @@ def test_names_of_policies_and_environments_are_checked():
 @pytest.mark.parametrize("file", sorted(PRETRAINED.rglob("*.pt")), ids=str)
 def test_shipped_policies_load_and_are_of_their_environment(file):
     policy = LearnedPolicy(file)
-    assert file in trained(policy.name, policy.config.env_id)
-    assert policy.config.sensing == "realistic"
+    assert file in trained(policy.name, policy.training.config.env_id)
+    assert policy.training.config.sensing == "realistic"
 
 
 @pytest.mark.parametrize("name", sorted(SCORES))

@@ -58,7 +58,7 @@ def test_the_actor_acts_as_the_learner_does(name, tmp_path, monkeypatch):
         seen, *_ = rows.step(theirs)
         observation, *_ = env.step(theirs[0])
     assert actor.name == name
-    assert actor.config == replace(config, run=Path())
+    assert actor.training.config == replace(config, run=Path())
     assert (tmp_path / ACTOR).stat().st_size < 20_000
     assert any(tmp_path.glob("log_1/events*"))
 
@@ -85,7 +85,7 @@ def test_an_interrupted_run_goes_on_and_continues_its_curve(name, tmp_path, monk
     monkeypatch.setattr(training.Checkpoints, "keep", keep)
     with pytest.raises(ValueError, match="unfinished run with other settings"):
         train(replace(config, seed=1), progress=False)
-    curve = LearnedPolicy(train(config, progress=False)).curve
+    curve = LearnedPolicy(train(config, progress=False)).training.curve
     assert curve.steps[: len(before)] == tuple(before)
     assert list(curve.steps) == sorted(set(curve.steps))
     assert curve.steps[-1] <= config.learner.steps
