@@ -35,7 +35,8 @@ def card(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:
         was made on. Settings: {settings}.""",
         f"**Sensing it was trained with**: {ranges} (newton, millimetre, steps).",
         f"""**Result**: force error {error:.2f} mN [{low:.2f}, {high:.2f}]: interquartile mean, with its 95 % interval,
-        of the root mean square after the search, over {config.episodes} test scenes, seeds from {config.seed}. Worst
+        of the root mean square after the search, over {config.episodes} test scenes, seeds from {config.seed}; of this
+        file alone {summary["rmse_of_seeds_mn"][0]:.2f} mN. Worst
         tenth {worst:.1f} mN; {share:.0%} end within 5 % of the set-point; {over:.2f} steps an episode above the force
         limit. Beside it: {others}.""",
         """**Limits**: it knows no other robot, sensing or task, and nothing guarantees that the force stays below the

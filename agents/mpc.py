@@ -8,9 +8,8 @@ import casadi as ca
 import numpy as np
 
 from agents.lag import Lag, seen_cables
-from agents.policy import Observation, Tare, search
+from agents.policy import Observation, Tare, search, set_points
 from agents.tuned import MPC, MPCSettings
-from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 
 SMALLEST_MM = 0.005  # moves below are not worth taking up the play for
 
@@ -61,7 +60,9 @@ class PredictiveController:
         self._readings.append((place, float(np.linalg.norm(measured))))
         force, slope = self._curve(here)
         full = settings.max_increment_mm
-        move = full * self._plan(max(slope, self.settings.least_slope) * full, force, self._goals(observation))
+        move = full * self._plan(
+            max(slope, self.settings.least_slope) * full, force, set_points(observation, self.settings.horizon)
+        )
         if abs(move) < SMALLEST_MM:
             return 0.0 * way
         effort = (here + move + np.copysign(slack, move) - motor) / full
@@ -84,13 +85,6 @@ class PredictiveController:
             matrix, [weights @ forces, weights @ (shape * forces) + trust * self.settings.slope]
         )
         return float(force), float(slope)
-
-    def _goals(self, observation: Observation) -> np.ndarray:
-        """Set-points after each of the next steps [N]."""
-        now = float(np.linalg.norm(observation["desired_force"]))
-        ahead = observation.get("desired_ahead", np.full(len(AHEAD), now))
-        steps = np.arange(1, self.settings.horizon + 1)
-        return np.asarray(FORCE_SCALE_N * np.interp(steps, (0, *AHEAD), (now, *ahead)))
 
     def _plan(self, gain: float, force: float, goals: np.ndarray) -> float:
         """The first of the moves that are planned, in full increments."""

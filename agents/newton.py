@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy import Observation, Tare, search
-from agents.tuned import NEWTON_GAINS
+from agents.lag import Lag, seen_cables
+from agents.policy import Observation, Tare, search, set_points
+from agents.tuned import NEWTON_GAIN
 from ccr_gym.fleet import Truth
 from ccr_gym.observation import FORCE_SCALE_N
 from solver import Equilibrium
@@ -14,17 +15,18 @@ from solver.sensitivity import CABLE, LENGTH, sensitivity
 from solver.spatial.sensitivity import CABLES, spatial_sensitivity
 
 PROBE_MM = 1e-3  # move of a trial
+PRIOR = np.full(2, 1e-6)  # a reading of 1 mN that agrees with the model [N²]
 
 
 @dataclass(slots=True)
 class NewtonController:
     """Newton steps on the exact slopes of the contact force in what the actions move, at the equilibrium itself.
 
-    It knows the model, the scene and the state of the robot, which no policy sees. Its force is that of the sensor,
-    whose zero it takes from before contact, and its robot has the rigidity that is known and motors without play. The
-    oracle knows all of it: the true force, the rigidity, the play and the next set-point, a bound for those that do
-    not. Where there are two actions the smallest increments are taken that meet the set-point, or come closest to one
-    that is a vector.
+    It knows the model, the scene and the state of the robot, which no policy sees, but for the rigidity: that is the
+    ratio of what the sensor reads to what the model felt a latency ago. The zero of the sensor is taken from before
+    contact, latency and play from where the cables are seen to be (:class:`Lag`). The oracle is told all of it, the
+    true force and the next set-point: a bound for those that are not. Where there are two actions the smallest
+    increments are taken that meet the set-point, or come closest to one that is a vector.
 
     Attributes:
         oracle: Whether it knows what is hidden.
@@ -34,36 +36,37 @@ class NewtonController:
     """
 
     oracle: bool = False
-    gain: float = 1.0
+    gain: float = NEWTON_GAIN
     damping: float = 1e-4
     name: str = "Newton"
     _env: Any = field(default=None, init=False)
     _tare: Tare = field(default_factory=Tare, init=False)
+    _lag: Lag = field(default_factory=lambda: Lag(1, 1), init=False)
+    _felt: list[float] = field(default_factory=list, init=False)
+    _fit: np.ndarray = field(default_factory=PRIOR.copy, init=False)
 
     @classmethod
-    def tuned(cls, env_id: str) -> "NewtonController":
-        """With the gain of least force error on training scenes with realistic sensing."""
-        return cls(gain=NEWTON_GAINS[env_id])
-
-    @classmethod
-    def knowing(cls, env_id: str = "") -> "NewtonController":
+    def knowing(cls) -> "NewtonController":
         """The oracle."""
-        return cls(oracle=True, name="Oracle")
+        return cls(oracle=True, gain=1.0, name="Oracle")
 
     def reset(self, env: Any = None) -> None:
         """Take the environment whose equilibrium is known."""
-        self._env = env
+        self._env, self._fit = env, PRIOR.copy()
         self._tare.forget()
+        self._felt.clear()
 
     def act(self, observation: Observation) -> np.ndarray:
         """Pull until something touches, then step to where the force is that of the set-point."""
         truth: Truth = self._env.get_wrapper_attr("truth")
         task, settings = self._env.get_wrapper_attr("task"), self._env.get_wrapper_attr("settings")
         if not self.oracle:
-            truth = self._seen(observation, truth)
+            truth = self._seen(observation, truth, settings)
         if not truth.force.any():
             return search(observation)
-        slopes = self._tried(truth) if self.oracle else self._slopes(task.target, "length" in observation)
+        slopes = (
+            self._tried(truth) if self.oracle else truth.stiffness * self._slopes(task.target, "length" in observation)
+        )
         if np.ndim(truth.goal) == 0:  # along the force as it is
             size = float(np.linalg.norm(truth.force))
             slopes, lacking = slopes @ (truth.force / size)[:, None], np.array([truth.goal - size])
@@ -79,13 +82,22 @@ class NewtonController:
         effort = (self.gain * increments + play) / task.body.increments(settings)
         return np.asarray(effort / max(1.0, np.abs(effort).max()), np.float32)
 
-    def _seen(self, observation: Observation, truth: Truth) -> Truth:
-        """What it takes for the truth if it does not know what is hidden; no force while nothing is seen to touch."""
-        force, goal = self._tare.force(observation), FORCE_SCALE_N * observation["desired_force"].astype(float)
-        if force is None:
-            force = np.zeros(truth.force.size)
-        here, still = truth.motors, np.zeros(truth.motors.size)
-        return Truth(force, 1.0, goal.item() if goal.size == 1 else goal, here, here, still)
+    def _seen(self, observation: Observation, truth: Truth, settings: Any) -> Truth:
+        """What it takes for the truth if it does not know what is hidden."""
+        force, cables = truth.force / truth.stiffness, observation["cable"].size
+        vector = FORCE_SCALE_N * observation["desired_force"].astype(float)
+        goal: Any = vector if vector.size > 1 else set_points(observation, 1).item()
+        if not self._felt:
+            self._lag = Lag(1, cables)
+        self._lag.see(truth.motors[None, :cables], seen_cables(observation, settings.robot)[None])
+        self._felt.append(float(np.linalg.norm(force)))
+        measured = self._tare.force(observation)
+        if measured is not None:
+            then = self._felt[max(-1 - self._lag.latency.item(), -len(self._felt))]
+            self._fit = self._fit + then * np.array([np.linalg.norm(measured), then])
+        ratio = self._fit[0] / self._fit[1]
+        slack = np.full(truth.slack.size, self._lag.slack)
+        return Truth(ratio * force, ratio, goal, truth.places, truth.motors, slack)
 
     def _tried(self, truth: Truth) -> np.ndarray:
         """The same of the true force, from trial moves that are solved exactly, which is faster."""

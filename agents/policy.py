@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 
 Observation = dict[str, np.ndarray]
 
@@ -37,6 +37,13 @@ def search(observation: Observation, angle: float = math.pi / 2) -> np.ndarray:
     azimuth = np.arctan2(observation["obstacle"][..., 1], observation["obstacle"][..., 0])
     pull = np.stack([np.cos(azimuth), np.cos(azimuth - angle)], axis=-1)
     return np.asarray(pull / np.abs(pull).max(axis=-1, keepdims=True), np.float32)
+
+
+def set_points(observation: Observation, steps: int) -> np.ndarray:
+    """Magnitudes of the set-points after the next steps, ``(steps,)`` [N]: as now, unless they are previewed."""
+    now = float(np.linalg.norm(observation["desired_force"]))
+    ahead = observation.get("desired_ahead", np.full(len(AHEAD), now))
+    return np.asarray(FORCE_SCALE_N * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
 
 
 class Tare:

@@ -18,6 +18,7 @@ WIDTH = 190  # of a printed table
 BOUND, RIVAL = "Oracle", "PI"
 COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {  # heading of a column, and its text from a summary
     "force error [mN]": lambda s: "{:.2f} [{:.2f}, {:.2f}]".format(s["rmse_iqm_mn"], *s["rmse_interval_mn"]),
+    "first seed": lambda s: f"{s['rmse_of_seeds_mn'][0]:.2f}" if len(s["rmse_of_seeds_mn"]) > 1 else "",
     "worst tenth": lambda s: f"{s['rmse_cvar_mn']:.1f}",
     "steady": lambda s: f"{s['steady_mn']:.2f}",
     "within 5 %": lambda s: f"{s['success']:.0%}",

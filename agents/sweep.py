@@ -44,7 +44,7 @@ def _policy(trial: optuna.Trial, config: SweepConfig) -> Policy:
     if config.what == "MPC":
         return PredictiveController(_mpc(trial))
     if config.what == "Newton":
-        return NewtonController(gain=trial.suggest_float("gain", 0.02, 1.0, log=True))
+        return NewtonController(gain=trial.suggest_float("gain", 0.2, 1.0))
     proportional = trial.suggest_float("proportional", 0.0, 40.0) if config.what == "PI" else 0.0
     return ForceController(proportional, trial.suggest_float("integral", 1.0, 40.0, log=True))
 

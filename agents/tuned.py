@@ -21,15 +21,7 @@ P_GAINS = {  # action per newton of force error
     "CCR/InsertAndPush-v0": 2.3,
     "CCR/SpatialPush-v0": 9.2,
 }
-NEWTON_GAINS = {  # part of a Newton step, from a few trials
-    "CCR/LoadCell-v0": 0.08,
-    "CCR/PushObstacle-v0": 0.15,
-    "CCR/TrackForce-v0": 0.15,
-    "CCR/BracedPush-v0": 0.12,
-    "CCR/SoftObstacle-v0": 0.15,
-    "CCR/InsertAndPush-v0": 0.05,
-    "CCR/SpatialPush-v0": 0.15,
-}
+NEWTON_GAIN = 0.8  # part of a Newton step
 
 
 @dataclass(frozen=True, slots=True)
