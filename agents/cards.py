@@ -22,7 +22,8 @@ def card(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:
     learner = result.trainings[0].config.learner
     settings = ", ".join(f"{name} {value:g}" for name, value in asdict(learner).items())
     seeds = ", ".join(str(training.config.seed) for training in result.trainings)
-    ranges = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in asdict(Sensing()).items())
+    drawn = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in asdict(Sensing()).items())
+    ranges = "ideal" if entry.sensing == "ideal" else f"{drawn} (newton, millimetre, steps)"
     low, high = summary["rmse_interval_mn"]
     others = "; ".join(f"{r.entry.policy} {r.summary['rmse_iqm_mn']:.2f}" for r in rivals if r is not result)
     spent, share, over = summary["training_seconds"], summary["success"], summary["violations"]
@@ -33,7 +34,7 @@ def card(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:
         `reset()` between episodes.""",
         f"""**Training**: scenes of `split="train"`, training seed {seeds}, {spent:.0f} s on one core of the machine it
         was made on. Settings: {settings}.""",
-        f"**Sensing it was trained with**: {ranges} (newton, millimetre, steps).",
+        f"**Sensing it was trained with**: {ranges}.",
         f"""**Result**: force error {error:.2f} mN [{low:.2f}, {high:.2f}]: interquartile mean, with its 95 % interval,
         of the root mean square after the search, over {config.episodes} test scenes, seeds from {config.seed}; of this
         file alone {summary["rmse_of_seeds_mn"][0]:.2f} mN. Worst

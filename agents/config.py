@@ -1,7 +1,7 @@
 """What the commands are told."""
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,6 +12,7 @@ from ccr_gym import ENV_IDS
 
 VALIDATION_SEED = 900_000  # training seeds stay below; learning curves are of seeds from here on
 VALIDATION_EPISODES = 64
+CURVE_POINTS = 15
 EVALUATION_SEED = 1_000_000  # evaluation seeds begin here
 
 POLICIES = ("P", "PI", "MPC", "Newton", *LEARNERS, "Oracle")
@@ -44,12 +45,15 @@ class TrainConfig:
 
     def __post_init__(self) -> None:
         learner = self.learner
-        for name in ("steps", "envs", "batch_size", "width"):
-            value = getattr(learner, name)
-            if value < 1:
+        for name, value in asdict(learner).items():
+            if isinstance(value, int) and value < 1:
                 raise ValueError(f"{name} is {value}; it must be at least 1")
         if not 0 <= self.seed <= VALIDATION_SEED - learner.envs:
             raise ValueError(f"seed is {self.seed}; it must be from 0 to {VALIDATION_SEED - learner.envs}")
+
+    def matches(self, other: "TrainConfig") -> bool:
+        """Whether both make the same policy, wherever and on however many threads."""
+        return replace(self, run=other.run, threads=other.threads) == other
 
     def dumps(self) -> str:
         """As JSON."""

@@ -16,16 +16,15 @@ from torch import nn
 from torch.utils.tensorboard import SummaryWriter
 
 from agents.actor import EPSILON, Curve, Network, deviation, scaled
-from agents.config import VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
+from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
 from agents.learners import environments
-from agents.policy import Observation, search
+from agents.policy import Observation, effort, search
 from agents.tuned import DistilledSettings
 from ccr_gym.fleet import Truth
 
 PROBE_MM = 0.02  # move that the slope of the force is measured with
 LEAST_SLOPE = 1e-3  # slope that is believed [N/mm]
 REACHED_N = 2e-5  # error that the teacher leaves
-CURVE_POINTS = 15
 
 
 def teach(envs: Any, observation: Observation) -> np.ndarray:
@@ -42,10 +41,8 @@ def teach(envs: Any, observation: Observation) -> np.ndarray:
     slope = np.maximum(np.abs(tried - force) / PROBE_MM, LEAST_SLOPE)
     lacking = np.where(np.abs(truth.goal - force) < REACHED_N, 0.0, truth.goal - force)
     moves = (lacking / slope)[:, None] * way
-    play = np.where(moves == 0, 0.0, truth.places + np.copysign(truth.slack, moves) - truth.motors)
-    effort = (moves + play) / body.increments(settings)
-    effort /= np.maximum(1.0, np.abs(effort).max(axis=1, keepdims=True))
-    return np.asarray(np.where(force[:, None] > 0, effort, way), np.float32)
+    acts = effort(moves, truth, body.increments(settings))
+    return np.where(force[:, None] > 0, acts, way.astype(np.float32))
 
 
 class Student:
@@ -92,9 +89,9 @@ def distill(config: TrainConfig, settings: DistilledSettings, progress: bool) ->
             log.add_scalar("train/loss", loss, here.stop)
             if (done + 1) % max(1, rounds // CURVE_POINTS) == 0:
                 played: Any = student
-                mean, _ = evaluate_policy(played, validation, VALIDATION_EPISODES)
+                mean: Any = evaluate_policy(played, validation, VALIDATION_EPISODES)[0]
                 steps.append(here.stop)
-                returns.append(float(np.mean(mean)))
+                returns.append(float(mean))
                 log.add_scalar("eval/mean_reward", returns[-1], here.stop)
     return student.network, student.seen, Curve(tuple(steps), tuple(returns))
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from agents.lag import Lag, seen_cables
-from agents.policy import Observation, Tare, search, set_points
+from agents.policy import Observation, Tare, effort, search, set_points
 from agents.tuned import NEWTON_GAIN
 from ccr_gym.fleet import Truth
 from ccr_gym.observation import FORCE_SCALE_N
@@ -78,9 +78,7 @@ class NewtonController:
             increments = np.linalg.solve(damped, slopes @ lacking)
             free &= np.where(increments > 0, truth.motors < high, truth.motors > low)
             slopes = slopes * free[:, None]
-        play = np.where(increments == 0, 0.0, truth.places + np.copysign(truth.slack, increments) - truth.motors)
-        effort = (self.gain * increments + play) / task.body.increments(settings)
-        return np.asarray(effort / max(1.0, np.abs(effort).max()), np.float32)
+        return effort(self.gain * increments, truth, task.body.increments(settings))
 
     def _seen(self, observation: Observation, truth: Truth, settings: Any) -> Truth:
         """What it takes for the truth if it does not know what is hidden."""
@@ -96,7 +94,7 @@ class NewtonController:
             then = self._felt[max(-1 - self._lag.latency.item(), -len(self._felt))]
             self._fit = self._fit + then * np.array([np.linalg.norm(measured), then])
         ratio = self._fit[0] / self._fit[1]
-        slack = np.full(truth.slack.size, self._lag.slack)
+        slack = np.where(np.arange(truth.slack.size) < cables, self._lag.slack, 0.0)  # an insertion has none
         return Truth(ratio * force, ratio, goal, truth.places, truth.motors, slack)
 
     def _tried(self, truth: Truth) -> np.ndarray:

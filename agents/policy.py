@@ -1,10 +1,10 @@
 """The contract of everything that acts."""
 
-import math
 from typing import Any, Protocol
 
 import numpy as np
 
+from ccr_gym.fleet import Truth
 from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 
 Observation = dict[str, np.ndarray]
@@ -22,12 +22,13 @@ class Policy(Protocol):
         """The action for an observation, ``(1,)``, in space ``(2,)``, in [−1, 1]."""
 
 
-def search(observation: Observation, angle: float = math.pi / 2) -> np.ndarray:
+def search(observation: Observation) -> np.ndarray:
     """The full action that bends the robot towards the obstacle, ``(..., actions)``: in the plane there is one way.
+
+    In space the cables are taken to be at right angles.
 
     Args:
         observation: What is seen, of one robot or of many.
-        angle: From the first cable to the second [rad].
     """
     many = observation["desired_force"].shape[:-1]
     if "length" in observation:
@@ -35,7 +36,7 @@ def search(observation: Observation, angle: float = math.pi / 2) -> np.ndarray:
     if "obstacle" not in observation:
         return np.ones((*many, 1), np.float32)
     azimuth = np.arctan2(observation["obstacle"][..., 1], observation["obstacle"][..., 0])
-    pull = np.stack([np.cos(azimuth), np.cos(azimuth - angle)], axis=-1)
+    pull = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
     return np.asarray(pull / np.abs(pull).max(axis=-1, keepdims=True), np.float32)
 
 
@@ -44,6 +45,19 @@ def set_points(observation: Observation, steps: int) -> np.ndarray:
     now = float(np.linalg.norm(observation["desired_force"]))
     ahead = observation.get("desired_ahead", np.full(len(AHEAD), now))
     return np.asarray(FORCE_SCALE_N * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
+
+
+def effort(moves: np.ndarray, truth: Truth, increments: np.ndarray) -> np.ndarray:
+    """Actions, ``(..., actions)``, for moves of what motors with play move [mm]: the play is taken up as well.
+
+    Args:
+        moves: Wanted moves, ``(..., actions)`` [mm]; where one is zero the motor stays.
+        truth: Places, motors and slack.
+        increments: What full actions move, ``(actions,)`` [mm].
+    """
+    play = np.where(moves == 0, 0.0, truth.places + np.copysign(truth.slack, moves) - truth.motors)
+    wanted = (moves + play) / increments
+    return np.asarray(wanted / np.maximum(1.0, np.abs(wanted).max(axis=-1, keepdims=True)), np.float32)
 
 
 class Tare:

@@ -39,7 +39,7 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
     report = told | {"results": [result.as_dict() for result in results]}
     (config.out / "evaluation.json").write_text(json.dumps(report) + "\n")
     first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
-    (config.out / "scores.json").write_text(json.dumps(first, indent=1) + "\n")
+    (config.out / "scores.json").write_text(json.dumps(first) + "\n")
     by_id = group(results)
     (config.out / "evaluation.md").write_text(f"{matrix(by_id)}\n{markdown(by_id)}")
     for result in results:

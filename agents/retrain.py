@@ -9,7 +9,7 @@ from rich.progress import track
 from agents.actor import ACTOR
 from agents.config import RetrainConfig, TrainConfig
 from agents.suite import folder_name
-from agents.training import CONFIG, train
+from agents.training import refuse_another, train
 from agents.tuned import LEARNERS
 from agents.workers import workers
 
@@ -31,13 +31,6 @@ def runs(config: RetrainConfig) -> list[TrainConfig]:
     ]
 
 
-def _done(run: TrainConfig) -> bool:
-    path = run.run / CONFIG
-    if path.is_file() and replace(TrainConfig.load(path), run=run.run) != run:
-        raise ValueError(f"{run.run} holds a run with other settings; give another folder, or remove it")
-    return (run.run / ACTOR).is_file()
-
-
 def retrain(config: RetrainConfig) -> None:
     """Train what is not trained yet, and put the actors where :mod:`agents.suite` finds shipped ones, in ``out``.
 
@@ -45,7 +38,9 @@ def retrain(config: RetrainConfig) -> None:
         ValueError: If a run is there with other settings; all are left as they are.
     """
     asked = runs(config)
-    missing = [run for run in asked if not _done(run)]
+    for run in asked:
+        refuse_another(run)
+    missing = [run for run in asked if not (run.run / ACTOR).is_file()]
     with workers(config.jobs) as pool:
         waiting = [pool.submit(train, run, False) for run in missing]
         for future in track(as_completed(waiting), "retrain", len(waiting)):

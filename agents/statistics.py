@@ -1,7 +1,5 @@
 """Statistics over episodes: interquartile means with bootstrap intervals, tail means, performance profiles."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy import stats
 
@@ -15,16 +13,23 @@ def iqm(samples: np.ndarray, axis: int = -1) -> np.ndarray:
     return np.asarray(stats.trim_mean(samples, QUARTER, axis=axis))
 
 
-def iqm_interval(strata: Sequence[np.ndarray], seed: int = 0) -> tuple[float, float]:
-    """95 % interval of the interquartile mean of all samples, from a stratified percentile bootstrap.
+def iqm_interval(samples: np.ndarray, seed: int = 0) -> tuple[float, float]:
+    """95 % interval of the interquartile mean of all samples, from a percentile bootstrap.
+
+    All training seeds play the same scenes: both are drawn anew, the seeds as rows and the scenes as columns.
 
     Args:
-        strata: Samples of each stratum, such as the episodes of one training seed, ``(k,)``; each is resampled alone.
+        samples: Of every training seed and scene, ``(seeds, scenes)``.
         seed: Of the resampling.
     """
+
+    def drawn(rows: np.ndarray, columns: np.ndarray, axis: int) -> np.ndarray:
+        crossed = samples[rows[..., :, None], columns[..., None, :]]
+        return iqm(crossed.reshape(*crossed.shape[:-2], -1), axis)
+
     found = stats.bootstrap(
-        [np.asarray(stratum, float) for stratum in strata],
-        lambda *drawn, axis: iqm(np.concatenate(drawn, axis=axis), axis),
+        [np.arange(max(count, 2)) % count for count in samples.shape],  # SciPy asks for two of each
+        drawn,
         n_resamples=RESAMPLES,
         method="percentile",
         vectorized=True,

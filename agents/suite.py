@@ -92,7 +92,7 @@ def summarize(metrics: dict[str, np.ndarray]) -> dict[str, Any]:
         "settling_step": float(np.median(metrics["settling_step"])),
         "overshoot": float(np.median(metrics["overshoot"])),
         "rmse_iqm_mn": float(iqm(rmse.ravel())),
-        "rmse_interval_mn": iqm_interval(list(rmse)),
+        "rmse_interval_mn": iqm_interval(rmse),
         "rmse_of_seeds_mn": [float(iqm(row)) for row in rmse],
         "rmse_cvar_mn": cvar(rmse.ravel()),
     }
@@ -103,7 +103,7 @@ def entries(config: EvaluateConfig) -> list[Entry]:
 
     Raises:
         FileNotFoundError: If a run has no trained policy.
-        ValueError: If a file is something else.
+        ValueError: If a file is something else, or runs were made with different sensing.
     """
     if not config.runs:
         return [
@@ -113,13 +113,19 @@ def entries(config: EvaluateConfig) -> list[Entry]:
             for files in [trained(policy, env_id, config.pretrained)]
             if policy not in LEARNERS or files
         ]
-    found: dict[tuple[str, str, str], list[Path]] = {}
+    found: dict[tuple[str, str], list[Path]] = {}
+    sensings: dict[str, Path] = {}
     for run in config.runs:
         learned = LearnedPolicy(run)
         trained_as = learned.training.config
-        found.setdefault((trained_as.env_id, trained_as.sensing, learned.name), []).append(run)
-    played = [Entry(name, env_id, sensing, tuple(files)) for (env_id, sensing, name), files in found.items()]
-    for env_id, sensing in dict.fromkeys((entry.env_id, entry.sensing) for entry in played):
+        found.setdefault((trained_as.env_id, learned.name), []).append(run)
+        sensings[trained_as.sensing] = run
+    if len(sensings) > 1:
+        told = " and ".join(f"{run} with {sensing}" for sensing, run in sensings.items())
+        raise ValueError(f"runs must have the same sensing; {told}. Evaluate them apart")
+    (sensing,) = sensings
+    played = [Entry(name, env_id, sensing, tuple(files)) for (env_id, name), files in found.items()]
+    for env_id in dict.fromkeys(env_id for env_id, _ in found):
         played += [Entry(name, env_id, sensing) for name in config.policies if name not in LEARNERS]
     return played
 
@@ -150,7 +156,7 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
             if keep:
                 shown.append(episode)
     if video is not None:
-        record(policies[0], entry.env_id, seed, 1, video, **told)
+        record(policies[0], entry.env_id, seed, video, **told)
     table = np.array(rows).reshape(len(policies), episodes, len(METRICS))
     metrics = {name: table[..., k] for k, name in enumerate(METRICS)}
     trainings = tuple(policy.training for policy in policies if isinstance(policy, LearnedPolicy))

@@ -14,13 +14,13 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.actor import ACTOR, Curve, Network, Training, export
-from agents.config import VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
+from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
 from agents.distillation import distill
 from agents.learners import KINDS, environments, learner, scaled
 from agents.tuned import DistilledSettings
 
 CONFIG, MODEL, NORMALIZER, PROGRESS = "config.json", "model.zip", "normalizer.pkl", "progress.json"
-CHECKPOINTS, CURVE_POINTS = 20, 15  # in a run
+CHECKPOINTS = 20  # in a run
 LEAST_APART = 64  # steps of all environments between points of the curve
 
 
@@ -28,10 +28,11 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
     """Train, or go on from the last checkpoint of the same run, and save; returns the run folder.
 
     Raises:
-        ValueError: If the folder holds a run with another configuration, which is left as it is.
+        ValueError: If the folder holds a run with other settings, which is left as it is.
     """
     torch.set_num_threads(1)  # faster than more for networks this small
     started = time.perf_counter()
+    refuse_another(config)
     config.run.mkdir(parents=True, exist_ok=True)
     last = _last_checkpoint(config)
     if isinstance(config.learner, DistilledSettings):
@@ -100,22 +101,27 @@ class Checkpoints(BaseCallback):
             shutil.rmtree(old)
 
 
+def refuse_another(config: TrainConfig) -> None:
+    """Check a run's folder.
+
+    Raises:
+        ValueError: If it holds a run with other settings.
+    """
+    path = config.run / CONFIG
+    if path.is_file() and not TrainConfig.load(path).matches(config):
+        raise ValueError(f"{config.run} holds a run with other settings; give another folder, or remove it")
+
+
 def _last_checkpoint(config: TrainConfig) -> Path | None:
     """That of a run that is gone on with; a run that begins writes its configuration."""
-    path = config.run / CONFIG
     kept = sorted(config.run.glob("checkpoint-*"), key=lambda folder: int(folder.name.split("-")[1]))
-    if kept and path.is_file() and not (config.run / ACTOR).is_file():
-        if TrainConfig.load(path) != config:
-            raise ValueError(
-                f"{config.run} holds an unfinished run with other settings; give those of {path} to go on with it, "
-                "or another folder"
-            )
+    if kept and not (config.run / ACTOR).is_file():
         return kept[-1]
     for stale in (*kept, config.run / "log_1"):
         shutil.rmtree(stale, ignore_errors=True)
     (config.run / ACTOR).unlink(missing_ok=True)
     (config.run / "evaluations.npz").unlink(missing_ok=True)
-    config.save(path)
+    config.save(config.run / CONFIG)
     return None
 
 
@@ -129,9 +135,9 @@ def _resumed(config: TrainConfig, checkpoint: Path) -> tuple[BaseAlgorithm, floa
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0]) % (
         VALIDATION_SEED - config.learner.envs
     )
-    bare = environments(config, config.learner.envs, seed)
-    envs = VecNormalize.load(str(checkpoint / NORMALIZER), bare)
+    envs = VecNormalize.load(str(checkpoint / NORMALIZER), environments(config, config.learner.envs, seed))
     model = KINDS[type(config.learner)].load(checkpoint / MODEL, env=envs, device="cpu")
+    model.set_random_seed(seed)  # loading sets that of the run
     model.tensorboard_log = str(config.run)
     return model, float(json.loads((checkpoint / PROGRESS).read_text())["seconds"])
 
@@ -139,6 +145,7 @@ def _resumed(config: TrainConfig, checkpoint: Path) -> tuple[BaseAlgorithm, floa
 def _validation(config: TrainConfig, steps: int) -> EvalCallback:
     """Mean returns on training scenes of other seeds, at even distances; those before some steps are kept."""
     envs = scaled(environments(config, VALIDATION_EPISODES, VALIDATION_SEED), config)
+    envs.training = False
     every = max(config.learner.steps // (CURVE_POINTS * config.learner.envs), LEAST_APART)
     validate = EvalCallback(
         envs, n_eval_episodes=VALIDATION_EPISODES, eval_freq=every, log_path=str(config.run), verbose=0, warn=False

@@ -1,4 +1,4 @@
-"""Settings that were tuned, all of them on training scenes with realistic sensing."""
+"""Settings that were tuned on training scenes, with realistic sensing unless it is said."""
 
 from dataclasses import dataclass
 from typing import ClassVar

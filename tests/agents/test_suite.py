@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import optuna
 import pytest
 
 from agents import cli, report, suite, training
@@ -104,7 +105,10 @@ def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments, "--env-id", "CCR/LoadCell-v0"])
     cli.main()
     cli.main()
-    assert "Best of 4" in capsys.readouterr().out
+    cli.main()
+    assert "Best of 6" in capsys.readouterr().out
+    study = optuna.load_study(study_name=None, storage=f"sqlite:///{tmp_path}/PI-LoadCell-v0.db")
+    assert len({tuple(trial.params.values()) for trial in study.trials}) == 6
 
 
 @pytest.mark.parametrize("learner", sorted(LEARNERS))
@@ -146,6 +150,13 @@ def test_what_is_missing_is_named(arguments, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
     with pytest.raises(SystemExit, match=r"Nope|train first"):
         cli.main()
+
+
+def test_runs_of_different_sensing_are_not_compared(run, tmp_path):
+    settings = PPOSettings(steps=64, envs=2, rollout=32, batch_size=64, epochs=1, width=8)
+    ideal = train(TrainConfig(run=tmp_path, sensing="ideal", learner=settings, threads=1), progress=False)
+    with pytest.raises(ValueError, match="runs must have the same sensing"):
+        suite.entries(EvaluateConfig(runs=(run, ideal)))
 
 
 def test_names_of_policies_and_environments_are_checked():

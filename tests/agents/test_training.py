@@ -13,7 +13,7 @@ from agents.config import TrainConfig
 from agents.learners import KINDS, environments
 from agents.suite import trained
 from agents.training import train
-from agents.tuned import PPOSettings, RecurrentPPOSettings, SACSettings
+from agents.tuned import DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings
 
 SMALL = {
     "PPO": PPOSettings(steps=1536, envs=4, rollout=64, batch_size=64, epochs=1, width=8),
@@ -83,9 +83,11 @@ def test_an_interrupted_run_goes_on_and_continues_its_curve(name, tmp_path, monk
     assert not (tmp_path / ACTOR).exists()
     before = np.load(tmp_path / "evaluations.npz")["timesteps"]
     monkeypatch.setattr(training.Checkpoints, "keep", keep)
-    with pytest.raises(ValueError, match="unfinished run with other settings"):
+    with pytest.raises(ValueError, match="a run with other settings"):
         train(replace(config, seed=1), progress=False)
-    curve = LearnedPolicy(train(config, progress=False)).training.curve
+    resumed, _ = training._resumed(config, kept)
+    assert resumed.get_env().unwrapped._seeds[0] != config.seed
+    curve = LearnedPolicy(train(replace(config, threads=2), progress=False)).training.curve
     assert curve.steps[: len(before)] == tuple(before)
     assert list(curve.steps) == sorted(set(curve.steps))
     assert curve.steps[-1] <= config.learner.steps
@@ -157,13 +159,16 @@ def test_training_seeds_end_where_validation_begins():
         TrainConfig(seed=899_999)
     with pytest.raises(ValueError, match="steps is 0"):
         TrainConfig(learner=PPOSettings(steps=0))
+    with pytest.raises(ValueError, match="weaning is 0"):
+        TrainConfig(learner=DistilledSettings(weaning=0))
 
 
 def test_a_run_folder_is_not_touched_by_another_configuration(tmp_path):
     config = TrainConfig(run=Path(tmp_path), learner=SMALL["PPO"], threads=1)
     config.save(tmp_path / training.CONFIG)
-    (tmp_path / "checkpoint-256").mkdir()
-    with pytest.raises(ValueError, match="other settings"):
-        train(replace(config, seed=3), progress=False)
-    assert (tmp_path / "checkpoint-256").is_dir()
+    (tmp_path / ACTOR).write_bytes(b"finished")
+    for other in (replace(config, seed=3), replace(config, learner=DistilledSettings(steps=64))):
+        with pytest.raises(ValueError, match="other settings"):
+            train(other, progress=False)
+    assert (tmp_path / ACTOR).read_bytes() == b"finished"
     assert TrainConfig.load(tmp_path / training.CONFIG) == config
