@@ -55,7 +55,7 @@ MPC = {
         effort=0.061, slope=0.028, least_slope=0.0063, trust=0.0022, stiffening=0.71, width_mm=0.21
     ),
     "CCR/BracedPush-v0": MPCSettings(
-        effort=1.1, slope=0.036, least_slope=0.046, trust=0.001, stiffening=0.68, width_mm=0.073
+        effort=0.0035, slope=0.0057, least_slope=0.023, trust=0.00056, stiffening=0.7, width_mm=0.3
     ),
     "CCR/SoftObstacle-v0": MPCSettings(
         effort=0.015, slope=0.03, least_slope=0.05, trust=0.0026, stiffening=0.16, width_mm=0.22
