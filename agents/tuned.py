@@ -49,7 +49,7 @@ MPC = {
         effort=0.44, slope=0.032, least_slope=0.022, trust=0.0016, stiffening=0.11, width_mm=0.14
     ),
     "CCR/PushObstacle-v0": MPCSettings(
-        effort=0.012, slope=0.011, least_slope=0.088, trust=0.0017, stiffening=0.69, width_mm=0.11
+        effort=0.016, slope=0.0027, least_slope=0.052, trust=0.00058, stiffening=0.64, width_mm=0.17
     ),
     "CCR/TrackForce-v0": MPCSettings(
         effort=0.061, slope=0.028, least_slope=0.0063, trust=0.0022, stiffening=0.71, width_mm=0.21
@@ -58,10 +58,10 @@ MPC = {
         effort=0.0035, slope=0.0057, least_slope=0.023, trust=0.00056, stiffening=0.7, width_mm=0.3
     ),
     "CCR/SoftObstacle-v0": MPCSettings(
-        effort=0.015, slope=0.03, least_slope=0.05, trust=0.0026, stiffening=0.16, width_mm=0.22
+        effort=0.005, slope=0.0097, least_slope=0.046, trust=0.00013, stiffening=0.2, width_mm=0.14
     ),
     "CCR/InsertAndPush-v0": MPCSettings(
-        effort=0.03, slope=0.025, least_slope=0.0056, trust=0.0083, stiffening=0.21, width_mm=0.41
+        effort=0.0047, slope=0.29, least_slope=0.032, trust=0.00016, stiffening=0.014, width_mm=0.44
     ),
     "CCR/SpatialPush-v0": MPCSettings(
         effort=0.24, slope=0.021, least_slope=0.0012, trust=0.0076, stiffening=0.26, width_mm=0.19
