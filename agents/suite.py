@@ -163,7 +163,7 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
     summary = summarize(metrics) | {
         "statuses": {status.name: statuses[status.name] for status in Status if statuses[status.name]},
         "decisions_per_second": steps / max(seconds, 1e-9),
-        "training_seconds": float(np.mean([training.seconds for training in trainings])) if trainings else 0.0,
+        "training_seconds": float(np.median([training.seconds for training in trainings])) if trainings else 0.0,
     }
     return Result(entry, metrics, summary, tuple(shown), trainings)
 
