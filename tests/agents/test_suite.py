@@ -16,6 +16,7 @@ from agents.suite import Entry, play, trained
 from agents.sweep import sweep
 from agents.training import train
 from agents.tuned import LEARNERS, PPOSettings
+from ccr_gym import ENV_IDS
 from solver import Status
 
 SCORES = json.loads((PRETRAINED / "scores.json").read_text())
@@ -182,6 +183,10 @@ def test_shipped_policies_give_the_numbers_of_the_table(name):
     (file,) = trained(policy, env_id)
     found = scores(LearnedPolicy(file), env_id, EVALUATION_SEED, 2, sensing="realistic", split="test")
     assert found == pytest.approx(SCORES[name][:2], rel=0.01, abs=0.02)
+
+
+def test_policies_of_every_learner_come_for_every_environment():
+    assert SCORES.keys() == {f"{learner} {env_id}" for learner in LEARNERS for env_id in ENV_IDS}
 
 
 def test_shipped_policies_are_small():
