@@ -28,6 +28,7 @@ COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {  # heading of a column, 
     "peak [mN]": lambda s: f"{s['peak_mn']:.0f}",
     "over limit": lambda s: f"{s['violations']:.2f}",
     "by estimate [mN]": lambda s: f"{s['estimate_rmse_mn']:.0f}",
+    "events": lambda s: f"{1 - s['statuses'].get('CONVERGED', 0) / sum(s['statuses'].values()):.2%}",
     "decisions/s": lambda s: f"{s['decisions_per_second']:.0f}",
     "training": lambda s: f"{s['training_seconds']:.0f} s" if s["training_seconds"] else "",
 }
