@@ -82,7 +82,7 @@ class NewtonController:
 
     def _seen(self, observation: Observation, truth: Truth, settings: Any) -> Truth:
         """What it takes for the truth if it does not know what is hidden."""
-        force, cables = truth.force / truth.stiffness, observation["cable"].size
+        force, cables = truth.force / truth.stiffness, observation["cable"].size  # the force of the model
         vector = FORCE_SCALE_N * observation["desired_force"].astype(float)
         goal: Any = vector if vector.size > 1 else set_points(observation, 1).item()
         if not self._felt:
@@ -97,12 +97,6 @@ class NewtonController:
         slack = np.where(np.arange(truth.slack.size) < cables, self._lag.slack, 0.0)  # an insertion has none
         return Truth(ratio * force, ratio, goal, truth.places, truth.motors, slack)
 
-    def _tried(self, truth: Truth) -> np.ndarray:
-        """The same of the true force, from trial moves that are solved exactly, which is faster."""
-        probe = self._env.get_wrapper_attr("probe")
-        trials = truth.places + PROBE_MM * np.eye(truth.places.size)
-        return np.array([(probe(places) - truth.force) / PROBE_MM for places in trials])
-
     def _slopes(self, target: int | None, insertion: bool) -> np.ndarray:
         """Slopes of the force that counts in what the actions move, ``(actions, d)`` [N/mm]."""
         equilibrium = self._env.get_wrapper_attr("equilibrium")
@@ -112,3 +106,9 @@ class NewtonController:
         else:
             slopes = spatial_sensitivity(equilibrium).forces[CABLES]
         return np.asarray(slopes[:, counted].sum(axis=1))
+
+    def _tried(self, truth: Truth) -> np.ndarray:
+        """The same of the true force, from trial moves that are solved exactly, which is faster."""
+        probe = self._env.get_wrapper_attr("probe")
+        trials = truth.places + PROBE_MM * np.eye(truth.places.size)
+        return np.array([(probe(places) - truth.force) / PROBE_MM for places in trials])
