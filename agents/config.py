@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -12,7 +12,7 @@ from ccr_gym import ENV_IDS
 
 VALIDATION_SEED = 900_000  # training seeds stay below; learning curves are of seeds from here on
 VALIDATION_EPISODES = 64
-CURVE_POINTS = 15
+CURVE_POINTS = 15  # of a run
 EVALUATION_SEED = 1_000_000  # evaluation seeds begin here
 
 POLICIES = ("P", "PI", "MPC", "Newton", *LEARNERS, "Oracle")
@@ -45,9 +45,7 @@ class TrainConfig:
 
     def __post_init__(self) -> None:
         learner = self.learner
-        for name, value in asdict(learner).items():
-            if isinstance(value, int) and value < 1:
-                raise ValueError(f"{name} is {value}; it must be at least 1")
+        _positive(learner, *(name for name, value in asdict(learner).items() if isinstance(value, int)))
         if not 0 <= self.seed <= VALIDATION_SEED - learner.envs:
             raise ValueError(f"seed is {self.seed}; it must be from 0 to {VALIDATION_SEED - learner.envs}")
 
@@ -114,9 +112,7 @@ class RetrainConfig:
         _known("env_ids", self.env_ids, tuple(ENV_IDS))
         if not 0 < self.share <= 1:
             raise ValueError(f"share is {self.share}; it must be above 0 and at most 1")
-        for name in ("seeds", "jobs"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
+        _positive(self, "seeds", "jobs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +141,7 @@ class EvaluateConfig:
     def __post_init__(self) -> None:
         _known("env_ids", self.env_ids, tuple(ENV_IDS))
         _known("policies", self.policies, POLICIES)
-        for name in ("episodes", "jobs"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
+        _positive(self, "episodes", "jobs")
         if self.seed < EVALUATION_SEED:
             raise ValueError(f"seed is {self.seed}; it must be at least {EVALUATION_SEED}, beyond the training seeds")
 
@@ -171,9 +165,7 @@ class SweepConfig:
 
     def __post_init__(self) -> None:
         _known("env_id", (self.env_id,), tuple(ENV_IDS))
-        for name in ("trials", "episodes", "steps"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
+        _positive(self, "trials", "episodes", "steps")
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,3 +194,10 @@ def _known(name: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:
     unknown = [value for value in given if value not in known]
     if unknown or not given:
         raise ValueError(f"{name} is {list(given)}; it must name some of {', '.join(known)}")
+
+
+def _positive(settings: Any, *names: str) -> None:
+    for name in names:
+        value = getattr(settings, name)
+        if value < 1:
+            raise ValueError(f"{name} is {value}; it must be at least 1")

@@ -59,10 +59,8 @@ class PredictiveController:
             return way
         self._readings.append((place, float(np.linalg.norm(measured))))
         force, slope = self._curve(here)
-        full = settings.max_increment_mm
-        move = full * self._plan(
-            max(slope, self.settings.least_slope) * full, force, set_points(observation, self.settings.horizon)
-        )
+        full, goals = settings.max_increment_mm, set_points(observation, self.settings.horizon)
+        move = full * self._plan(max(slope, self.settings.least_slope) * full, force, goals)
         if abs(move) < SMALLEST_MM:
             return 0.0 * way
         effort = (here + move + np.copysign(slack, move) - motor) / full

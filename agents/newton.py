@@ -53,6 +53,7 @@ class NewtonController:
     def reset(self, env: Any = None) -> None:
         """Take the environment whose equilibrium is known."""
         self._env, self._fit = env, PRIOR.copy()
+        self._lag = Lag(1, env.get_wrapper_attr("task").body.model.cables)
         self._tare.forget()
         self._felt.clear()
 
@@ -64,9 +65,7 @@ class NewtonController:
             truth = self._seen(observation, truth, settings)
         if not truth.force.any():
             return search(observation)
-        slopes = (
-            self._tried(truth) if self.oracle else truth.stiffness * self._slopes(task.target, "length" in observation)
-        )
+        slopes = self._tried(truth) if self.oracle else self._slopes(truth, task.target, "length" in observation)
         if np.ndim(truth.goal) == 0:  # along the force as it is
             size = float(np.linalg.norm(truth.force))
             slopes, lacking = slopes @ (truth.force / size)[:, None], np.array([truth.goal - size])
@@ -85,8 +84,6 @@ class NewtonController:
         force, cables = truth.force / truth.stiffness, observation["cable"].size  # the force of the model
         vector = FORCE_SCALE_N * observation["desired_force"].astype(float)
         goal: Any = vector if vector.size > 1 else set_points(observation, 1).item()
-        if not self._felt:
-            self._lag = Lag(1, cables)
         self._lag.see(truth.motors[None, :cables], seen_cables(observation, settings.robot)[None])
         self._felt.append(float(np.linalg.norm(force)))
         measured = self._tare.force(observation)
@@ -97,7 +94,7 @@ class NewtonController:
         slack = np.where(np.arange(truth.slack.size) < cables, self._lag.slack, 0.0)  # an insertion has none
         return Truth(ratio * force, ratio, goal, truth.places, truth.motors, slack)
 
-    def _slopes(self, target: int | None, insertion: bool) -> np.ndarray:
+    def _slopes(self, truth: Truth, target: int | None, insertion: bool) -> np.ndarray:
         """Slopes of the force that counts in what the actions move, ``(actions, d)`` [N/mm]."""
         equilibrium = self._env.get_wrapper_attr("equilibrium")
         counted = slice(None) if target is None else slice(target, target + 1)
@@ -105,7 +102,7 @@ class NewtonController:
             slopes = sensitivity(equilibrium).forces[[CABLE, LENGTH] if insertion else [CABLE]]
         else:
             slopes = spatial_sensitivity(equilibrium).forces[CABLES]
-        return np.asarray(slopes[:, counted].sum(axis=1))
+        return np.asarray(truth.stiffness * slopes[:, counted].sum(axis=1))
 
     def _tried(self, truth: Truth) -> np.ndarray:
         """The same of the true force, from trial moves that are solved exactly, which is faster."""

@@ -20,6 +20,7 @@ from ccr_gym import ENV_IDS
 from solver import Status
 
 SCORES = json.loads((PRETRAINED / "scores.json").read_text())
+SMALL = PPOSettings(steps=512, envs=4, rollout=32, batch_size=64, epochs=1, width=8)
 
 
 def episode(true, goal=0.1, cost=0.0):
@@ -46,8 +47,7 @@ def test_the_metrics_of_a_known_episode():
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
-    settings = PPOSettings(steps=512, envs=4, rollout=32, batch_size=64, epochs=1, width=8)
-    return train(TrainConfig(run=tmp_path_factory.mktemp("run"), learner=settings, threads=1), progress=False)
+    return train(TrainConfig(run=tmp_path_factory.mktemp("run"), learner=SMALL, threads=1), progress=False)
 
 
 def test_evaluate_writes_table_figures_and_videos(run, tmp_path, monkeypatch, capsys):
@@ -154,8 +154,7 @@ def test_what_is_missing_is_named(arguments, tmp_path, monkeypatch):
 
 
 def test_runs_of_different_sensing_are_not_compared(run, tmp_path):
-    settings = PPOSettings(steps=64, envs=2, rollout=32, batch_size=64, epochs=1, width=8)
-    ideal = train(TrainConfig(run=tmp_path, sensing="ideal", learner=settings, threads=1), progress=False)
+    ideal = train(TrainConfig(run=tmp_path, sensing="ideal", learner=SMALL, threads=1), progress=False)
     with pytest.raises(ValueError, match="runs must have the same sensing"):
         suite.entries(EvaluateConfig(runs=(run, ideal)))
 
