@@ -114,14 +114,15 @@ def refuse_another(config: TrainConfig) -> None:
 
 def _last_checkpoint(config: TrainConfig) -> Path | None:
     """That of a run that is gone on with; a run that begins writes its configuration."""
+    path = config.run / CONFIG
     kept = sorted(config.run.glob("checkpoint-*"), key=lambda folder: int(folder.name.split("-")[1]))
-    if kept and not (config.run / ACTOR).is_file():
+    if kept and path.is_file() and not (config.run / ACTOR).is_file():
         return kept[-1]
     for stale in (*kept, config.run / "log_1"):
         shutil.rmtree(stale, ignore_errors=True)
     (config.run / ACTOR).unlink(missing_ok=True)
     (config.run / "evaluations.npz").unlink(missing_ok=True)
-    config.save(config.run / CONFIG)
+    config.save(path)
     return None
 
 

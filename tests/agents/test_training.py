@@ -108,6 +108,13 @@ def test_a_checkpoint_that_was_being_written_does_not_count(tmp_path, monkeypatc
     assert not list(tmp_path.glob("checkpoint-*"))
 
 
+def test_checkpoints_of_unknown_settings_are_not_gone_on_with(tmp_path):
+    (tmp_path / "checkpoint-256").mkdir()
+    curve = LearnedPolicy(train(TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1), False)).training.curve
+    assert curve.steps[0] == 512
+    assert not (tmp_path / "checkpoint-256").exists()
+
+
 def test_a_finished_run_is_trained_anew(tmp_path):
     config = TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1)
     first, second = (torch.load(train(config, progress=False) / ACTOR, weights_only=True) for _ in range(2))
@@ -166,9 +173,13 @@ def test_training_seeds_end_where_validation_begins():
 def test_a_run_folder_is_not_touched_by_another_configuration(tmp_path):
     config = TrainConfig(run=Path(tmp_path), learner=SMALL["PPO"], threads=1)
     config.save(tmp_path / training.CONFIG)
+    (tmp_path / "checkpoint-256").mkdir()
+    with pytest.raises(ValueError, match="other settings"):
+        train(replace(config, seed=3), progress=False)
     (tmp_path / ACTOR).write_bytes(b"finished")
     for other in (replace(config, seed=3), replace(config, learner=DistilledSettings(steps=64))):
         with pytest.raises(ValueError, match="other settings"):
             train(other, progress=False)
     assert (tmp_path / ACTOR).read_bytes() == b"finished"
+    assert (tmp_path / "checkpoint-256").is_dir()
     assert TrainConfig.load(tmp_path / training.CONFIG) == config
