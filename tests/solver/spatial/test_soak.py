@@ -35,10 +35,10 @@ def test_random_walk(pytestconfig, robot, mix, random_sphere, random_shape, rand
             assert after.displacements[[o.stiffness is None for o in solver.scene]].any() == 0
             way = [before.nodes, after.nodes]
             if after.status is Status.SNAPPED:
-                way = list(solver.trace(before, np.clip(after.cables_mm, -12, 12)))
+                way = list(solver.trace(before, np.clip(after.cables_mm, -12, 12)).nodes)
                 way = [before.nodes, *way] if np.allclose(way[-1], after.nodes, atol=1e-6) else []
             # A way of 8.5 mm is the longest that is taken at once; a sphere of 10 mm is cut 0.9 mm deep by it at most.
             assert all(deepest(solver, *pair) < 1.5 for pair in pairwise(way))
     print(dict(counts), touched)
-    assert "FAILED" not in counts
+    assert "GAVE_UP" not in counts
     assert touched > 0
