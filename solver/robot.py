@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 LINES = ("backbone", "cable", "rim")
 CABLES = ("uniform", "sliding")
+ANGLES = 64  # at which the longest edge of a bent segment is looked for
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,12 +149,13 @@ class Robot:
         segment = self.lengths_mm[1] / self.segments
         if self.cable == "sliding":
             assert self.disk_radius_mm is not None
-            widest = (segment - self.disk_thickness_mm) / self.disk_radius_mm
-            stretched = [abs(line) * widest for line in self.lines_mm]
+            widest = min((segment - self.disk_thickness_mm) / self.disk_radius_mm, math.pi)
+            angles = [widest * k / ANGLES for k in range(1, ANGLES + 1)]
+            longest = [max(2 * (segment / t + abs(line)) * math.sin(t / 2) for t in angles) for line in self.lines_mm]
         else:
             turned = math.sqrt(segment**2 - (segment - self.cable_limit_mm / self.segments) ** 2) / self.offset_mm
-            stretched = [max(0.0, -line) * turned for line in self.lines_mm]
-        return tuple((segment + stretch) / (self.between + 1) for stretch in stretched)
+            longest = [segment + max(0.0, -line) * turned for line in self.lines_mm]
+        return tuple(max(segment, length) / (self.between + 1) for length in longest)
 
     @property
     def stiffness(self) -> float:

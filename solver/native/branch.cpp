@@ -467,7 +467,9 @@ template <class Model>
 bool Branch<Model>::finish() {
   const double energy = newton_.chain.energy();
   trial_ = present_;
+  newton_.chain.fence(false);
   const Verdict verdict = newton_.solve(trial_);
+  newton_.chain.fence(true);
   iterations += verdict.iterations;
   if (!verdict.converged || newton_.chain.energy() > energy || !close_by()) return false;
   std::swap(present_, trial_);
@@ -514,6 +516,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
   const std::size_t start_trace = trace ? trace->size() : 0;
   settled_ = false;
   const auto undo = [&](End reason) {
+    newton_.chain.fence(false);
     present_ = start;
     points_ = start_points;
     mounts_ = start_mounts;
@@ -523,12 +526,15 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     return reason;
   };
 
+  newton_.chain.fence(true);
   bool moved = newton_.measure(present_) && (depart(command, true) || depart(command, false));
   for (int i = 0; i < kDescentIterations && moved && !spent(); ++i) {
     std::swap(present_, trial_);
     remember();
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && finish();
     if (!finished && !descend(moved)) continue;
+    if (!finished && newton_.chain.at_fence() && !finish()) break;
+    newton_.chain.fence(false);
     settled_ = false;
     forget();
     settle();

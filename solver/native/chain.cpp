@@ -83,12 +83,36 @@ template <class Model>
 bool Chain<Model>::evaluate(const Iterate& at) {
   if (!model_.evaluate(at.command, at.controls)) return false;
   load_springs(at.mounts);
+  fence_energy_ = 0;
+  if (fenced_) raise_fence(at.controls);
   for (int i = 0; i <= robot_.segments; ++i)
     for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
   place_points<Model>(robot_, nodes_, frames(), points_);
   measure_gaps();
   if constexpr (Model::kSliding) measure_limits(at.command);
   return true;
+}
+
+// Half of kFence times the square by which the squared shear, over its limit's, exceeds kFenceShear.
+template <class Model>
+void Chain<Model>::raise_fence(const std::vector<Control>& controls) {
+  fence_slope_.assign(controls.size(), {});
+  fence_curvature_.assign(controls.size(), {});
+  const double square = model_.widest_shear() * model_.widest_shear();
+  for (std::size_t i = 0; i < controls.size(); ++i) {
+    double shear = 0;
+    for (int k = 0; k < Model::kShears; ++k) shear += controls[i][k] * controls[i][k];
+    const double excess = shear / square - limits::kFenceShear;
+    if (excess <= 0) continue;
+    fence_energy_ += limits::kFence * excess * excess / 2;
+    const double rise = 2 * limits::kFence / square;
+    for (int r = 0; r < Model::kShears; ++r) {
+      fence_slope_[i][r] = rise * excess * controls[i][r];
+      fence_curvature_[i](r, r) = rise * excess;
+      for (int c = 0; c < Model::kShears; ++c) fence_curvature_[i](r, c) += 2 * rise / square * controls[i][r] * controls[i][c];
+    }
+  }
+  energy_ += fence_energy_;
 }
 
 template <class Model>
@@ -265,11 +289,15 @@ void Chain<Model>::reduced_gradient(const ActiveSet& active) {
     }
   }
   model_.adjoin(pulls_);
+  if (at_fence())
+    for (std::size_t i = 0; i < fence_slope_.size(); ++i) model_.gradient[i] += fence_slope_[i];
 }
 
 template <class Model>
 void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
   model_.curvature(system);
+  if (at_fence())
+    for (std::size_t i = 0; i < fence_curvature_.size(); ++i) system.stages[i].huu += fence_curvature_[i];
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     if constexpr (Model::kSliding)

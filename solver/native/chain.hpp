@@ -82,6 +82,11 @@ class Chain {
   // Shape under the command; false when a coordinate leaves the range of the segment law.
   bool evaluate(const Iterate& at);
 
+  // Adds energy, while `on`, to segments that shear so far that they come near to folding over, which no equilibrium of
+  // interest does but a descent may pass through.
+  void fence(bool on) { fenced_ = on; }
+  bool at_fence() const { return fence_energy_ > 0; }  // of the last shape
+
   // The shape that no obstacle touches, which is known, and what holds it.
   void relax(Iterate& at);
 
@@ -142,6 +147,7 @@ class Chain {
   Position lever(const Site& site, int node) const { return Model::lever(model_.frames[node], site.line); }
   Position moved(int obstacle) const { return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]]; }
   void add_disk_curvature(int contact, double scale, System& system) const requires(Model::kSliding);
+  void raise_fence(const std::vector<Control>& controls);
   void load_springs(const std::vector<Position>& mounts);
   void measure_gaps();
   void measure_limits(const Command& command) requires(Model::kSliding);
@@ -154,6 +160,10 @@ class Chain {
   std::span<const Obstacle> obstacles_;
   double reach_ = 0;  // from a node, within which its points may be near an obstacle
   double energy_ = 0;
+  bool fenced_ = false;
+  double fence_energy_ = 0;
+  std::vector<Control> fence_slope_;                                          // (segments), while fenced
+  std::vector<Mat<Model::kControl, Model::kControl>> fence_curvature_;
   std::vector<Position> origin_;  // nodes of the shape looked around from
   std::vector<Position> mount_origin_;  // mounts of that shape
   std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach

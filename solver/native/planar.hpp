@@ -70,6 +70,7 @@ class Planar {
 
   double slack(const Command<1>& command) const requires(kSliding) { return states.back()[kState - 1] - command.cables[0]; }
   DiskGap disk_gap(int segment, int side) const requires(kSliding);  // 1 for the cable's side, -1 for the other
+  double widest_shear() const { return kSliding ? HUGE_VAL : 1 - pull_ / length_; }  // sine of it
   double free_turn() const { return pull_ / robot_.offset; }  // of a segment that nothing touches, about
   double segment_length() const { return length_; }
 

@@ -73,6 +73,7 @@ class Spatial {
 
   Vec<kTip> free_slopes(const Command<2>& command) const;
 
+  double widest_shear() const { return 1; }  // sine of it
   double free_turn() const;  // of a segment that nothing touches, about
   double segment_length() const { return told_.length; }
 

@@ -109,13 +109,17 @@ def test_gap_on_the_outline(obstacle):
     assert obstacle.gap(outline) == pytest.approx(0, abs=1e-12)
     assert np.linalg.norm(slopes, axis=-1) == pytest.approx(1, abs=1e-12)
     assert obstacle.gap(outline + 0.1 * slopes) == pytest.approx(0.1, abs=0.005)
-    center, radius, width, fineness = obstacle.extent
+    center, radius, inradius, fineness = obstacle.extent
     assert np.linalg.norm(outline - center, axis=-1).max() <= radius * (1 + 1e-12)
     assert 0 < fineness <= radius
     if len(outline) > 1:
-        angles = np.linspace(0, np.pi, 2000)
-        spans = np.ptp(outline @ [np.cos(angles), np.sin(angles)], axis=0)
-        assert width == pytest.approx(spans.min(), rel=5e-3)
+        steps = np.linspace(-radius, radius, 101)
+        inside = (center + np.stack(np.meshgrid(steps, steps), axis=-1)).reshape(-1, 2)
+        inside = inside[obstacle.gap(inside) < 0]
+        shares = np.linspace(0, 1, 40)[:, None, None]
+        surface = (outline + shares * (np.roll(outline, -1, axis=0) - outline)).reshape(-1, 2)
+        depths = [np.linalg.norm(surface - point, axis=-1).min() for point in inside]
+        assert inradius == pytest.approx(max(depths), rel=0.05)
 
 
 @EVERY_OBSTACLE

@@ -35,7 +35,7 @@ def test_free_robot_grows_and_shrinks(cable):
 
 @EVERY_CABLE
 def test_inserted_past_a_circle(cable):
-    solver = Solver(robot_with(cable), Scene([Circle(center=(40, 120), radius=10)]))
+    solver = Solver(robot_with(cable), Scene([Circle(center=(42, 120), radius=12)]))
     states = [solver.step(solver.rest(), 6.0, 120)]
     for length in range(122, 190, 2):
         states.append(solver.step(states[-1], 6.0, length))
