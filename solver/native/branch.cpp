@@ -56,6 +56,12 @@ double Branch<Model>::apart(const Command& a, const Command& b) const {
   return std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
 }
 
+// What the trend is counted by. Several cables move evenly while it lasts.
+template <class Model>
+double Branch<Model>::travelled(const Command& from, const Command& to) const {
+  return kCables == 1 ? to.cables[0] - from.cables[0] : apart(from, to);
+}
+
 template <class Model>
 Branch<Model>::Branch(const Robot& robot, int obstacles)
     : newton_(robot, obstacles), nodes_(robot.segments + 1), frames_(robot.segments + 1), points_(robot.points()) {
@@ -129,7 +135,7 @@ void Branch<Model>::load(const double* block) {
   }
   settled_ = false;
   touched_ = chain.touching(active);
-  if (!kTrend) return;
+  if (!kTrend) return forget();
   for (auto& control : trend_.controls) read(block, control.v);
   read_mounts(trend_.mounts);
   read(block, trend_.multipliers);
@@ -220,9 +226,8 @@ void Branch<Model>::accept() {
 
 template <class Model>
 void Branch<Model>::learn() {
-  if (!kTrend) return;
   const ActiveSet &before = present_.active, &now = trial_.active;
-  const double pulled = trial_.command.cables[0] - present_.command.cables[0];
+  const double pulled = travelled(present_.command, trial_.command);
   forget();
   if (pulled == 0 || trial_.command.length != present_.command.length || !newton_.chain.touching(now) ||
       before.count != now.count || !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
@@ -247,8 +252,7 @@ void Branch<Model>::forget() {
 template <class Model>
 void Branch<Model>::predict() {
   steady_ = false;
-  if (!kTrend) return;
-  const double pulled = trial_.command.cables[0] - present_.command.cables[0];
+  const double pulled = travelled(present_.command, trial_.command);
   const auto go_on = [&](auto& at, const auto& slope) {
     for (std::size_t k = 0; k < slope.v.size(); ++k) at[k] += pulled * slope[k];
   };
@@ -608,6 +612,7 @@ Status Branch<Model>::follow(const Command& target) {
       // A release may end in a snap to more tension than the motor holds: it yields until it holds again.
       if (highest(tensions_) <= newton_.chain.robot().max_tension || pull(present_.command.cables) == 0) return reached;
       yield(wanted);
+      forget();
       reached = std::max(reached, Status::kStalled);
       continue;
     }
@@ -637,6 +642,7 @@ Status Branch<Model>::follow(const Command& target) {
     if (stalled) {
       reached = Status::kStalled;
       if (!hold(wanted)) return reached;
+      forget();
     }
   }
   return Status::kGaveUp;

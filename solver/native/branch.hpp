@@ -59,7 +59,7 @@ class Follower {
   std::vector<double>* trace = nullptr;
 };
 
-// How an equilibrium has changed per millimetre of cable, to start the search for the next one; zero where it is free, or
+// How an equilibrium has changed along the way of the command, to start the search for the next one; zero where it is free, or
 // a contact came or went.
 template <class Model>
 struct Trend {
@@ -76,7 +76,7 @@ template <class Model>
 class Branch : public Follower<Model::kSpace> {
  public:
   static constexpr int kSpace = Model::kSpace, kCables = Model::kCables;
-  static constexpr bool kTrend = kCables == 1;  // whether steps are so much alike that the last one tells of the next
+  static constexpr bool kTrend = kCables == 1;  // whether the trend of a step is kept for the next
   using Chain = ccr::Chain<Model>;
   using Position = ccr::Position<kSpace>;
   using Command = ccr::Command<kCables>;
@@ -109,6 +109,7 @@ class Branch : public Follower<Model::kSpace> {
   bool hold(Command& wanted) const;
   void yield(Command& wanted) const;
   double apart(const Command& a, const Command& b) const;
+  double travelled(const Command& from, const Command& to) const;
   bool spent() const { return newton_.work() - work_before_ > limits::kWork; }
   Move attempt(const Command& command);
   double lost(const Command& command) const;

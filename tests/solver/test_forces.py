@@ -21,7 +21,7 @@ SCENES = [
         [
             Circle(center=(33, 89), radius=12.5, stiffness=0.3),
             Ellipse(center=(59, 140), radii=(16, 12), stiffness=((2, 0.5), (0.5, 1))),
-            Capsule(start=(70, 60), end=(80, 70), radius=10),
+            Capsule(start=(70, 60), end=(80, 70), radius=10.5),
             Polygon(corners=((70, 100), (80, 100), (75, 110)), radius=8),
         ]
     ),
