@@ -1,4 +1,23 @@
-"""Refusals at the boundary."""
+"""Refusals at the boundary: every message names the field, its value and what it must be.
+
+A dataclass declares the check of a field beside its default, and runs all of them when it is made::
+
+    @dataclass(frozen=True, slots=True)
+    class MyTask(Task):
+        radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, above=0)
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import partial
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+LARGEST = 1e100  # of any number, so that squares and ratios stay finite
+LONGEST = 200  # characters of a value in a message
 
 
 def require(condition: bool, message: str) -> None:
@@ -9,3 +28,249 @@ def require(condition: bool, message: str) -> None:
     """
     if not condition:
         raise ValueError(message)
+
+
+def require_type(condition: bool, message: str) -> None:
+    """Refuse what is not of a type.
+
+    Raises:
+        TypeError: With the message.
+    """
+    if not condition:
+        raise TypeError(message)
+
+
+def checked(default: Any, check: Callable[..., Any], /, **bounds: Any) -> Any:
+    """Declare a dataclass field together with its check, which :func:`check_fields` runs.
+
+    Args:
+        default: The default value, or a function that makes it.
+        check: One of the checks below, or any ``check(name, value, **bounds)`` that returns the value to keep.
+        **bounds: Passed to the check.
+    """
+    metadata = {"check": partial(check, **bounds)}
+    if callable(default):
+        return field(default_factory=default, metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+def nested(kind: type[Any], default: Callable[[], Any] | None = None) -> Any:
+    """Declare a dataclass field that is a dataclass itself, or a mapping of its fields, or ``None`` for the default."""
+    default = default or kind
+    return checked(default, check_instance, kind=kind, default=default)
+
+
+def check_fields(instance: Any) -> None:
+    """Check the fields of a dataclass that were declared with :func:`checked`, and keep what the checks return.
+
+    Raises:
+        TypeError: If a value is of the wrong type.
+        ValueError: If a value is out of its bounds.
+    """
+    for declared in fields(instance):
+        if check := declared.metadata.get("check"):
+            object.__setattr__(instance, declared.name, check(declared.name, getattr(instance, declared.name)))
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Where a number may lie; never at infinity.
+
+    Attributes:
+        low: Smallest value.
+        high: Largest value.
+        above: Value that it must exceed, instead of ``low``.
+        below: Value that it must stay under, instead of ``high``.
+    """
+
+    low: float = -LARGEST
+    high: float = LARGEST
+    above: float | None = None
+    below: float | None = None
+
+    def __contains__(self, value: Any) -> bool:
+        inside = self.low <= value <= self.high
+        return inside and (self.above is None or value > self.above) and (self.below is None or value < self.below)
+
+    def __str__(self) -> str:
+        least = f"at least {self.low:g}" if self.above is None else f"above {self.above:g}"
+        most = f"at most {self.high:g}" if self.below is None else f"below {self.below:g}"
+        return f"{least} and {most}"
+
+
+def check_number(name: str, value: Any, **bounds: float) -> float:
+    """Return a number as a float.
+
+    Args:
+        name: What it is called.
+        value: Any kind of real number, but no bool.
+        **bounds: As :class:`Bounds`.
+
+    Raises:
+        TypeError: If it is no number.
+        ValueError: If it is out of bounds, or not finite.
+    """
+    limits = Bounds(**bounds)
+    message = f"{name} is {shown(value)}; it must be a number {limits}"
+    require_type(_is_number(value), message)
+    require(_finite(value) and value in limits, message)
+    return float(value)
+
+
+def check_whole(name: str, value: Any, **bounds: float) -> int:
+    """Return a whole number as an int; bounds and errors as :func:`check_number`."""
+    limits = Bounds(**bounds)
+    message = f"{name} is {shown(value)}; it must be a whole number {limits}"
+    require_type(_is_number(value), message)
+    require(isinstance(value, Integral) and value in limits, message)
+    return int(value)
+
+
+def check_range(name: str, value: Any, *, whole: bool = False, **bounds: float) -> tuple[Any, Any]:
+    """Return the ends of a range as a tuple of two numbers that do not descend; both may be equal.
+
+    Args:
+        name: What it is called.
+        value: Two numbers in a tuple, list or array.
+        whole: Whether both must be whole.
+        **bounds: As :class:`Bounds`.
+
+    Raises:
+        TypeError: If it is anything else.
+        ValueError: If an end is out of bounds or not finite, or the first exceeds the second.
+    """
+    limits = Bounds(**bounds)
+    numbers = "whole numbers" if whole else "numbers"
+    message = f"{name} is {shown(value)}; it must be two {numbers} {limits}, the smaller one first"
+    require_type(is_listed(value) and len(value) == 2 and all(map(_is_number, value)), message)
+    fit = all(_finite(end) and end in limits and (not whole or isinstance(end, Integral)) for end in value)
+    require(fit and value[0] <= value[1], message)
+    low, high = map(int if whole else float, value)
+    return low, high
+
+
+def check_ranges(name: str, value: Any, *, bounds: Sequence[Mapping[str, Any]]) -> tuple[tuple[Any, Any], ...]:
+    """Return several ranges as a tuple, each checked against bounds of its own."""
+    message = f"{name} is {shown(value)}; it must be {len(bounds)} ranges of two numbers each"
+    require_type(is_listed(value) and len(value) == len(bounds), message)
+    return tuple(check_range(f"{name}[{k}]", ends, **bounds[k]) for k, ends in enumerate(value))
+
+
+def check_flag(name: str, value: Any) -> bool:
+    """Return a truth value as a bool.
+
+    Raises:
+        TypeError: If it is anything else.
+    """
+    require_type(isinstance(value, bool | np.bool_), f"{name} is {shown(value)}; it must be True or False")
+    return bool(value)
+
+
+def check_choice(name: str, value: Any, *, choices: Sequence[str]) -> str:
+    """Return a word that is one of some.
+
+    Raises:
+        TypeError: If it is no string.
+        ValueError: If it is none of them.
+    """
+    message = f"{name} is {shown(value)}; it must be {' or '.join(map(repr, choices))}"
+    require_type(isinstance(value, str), message)
+    require(value in choices, message)
+    return str(value)
+
+
+def check_instance(name: str, value: Any, *, kind: type[Any], default: Callable[[], Any] | None = None) -> Any:
+    """Return a dataclass from one, from a mapping of its fields, or the default from ``None`` or an empty mapping.
+
+    Raises:
+        TypeError: If it is anything else, or the mapping names a field that does not exist.
+        ValueError: As the dataclass.
+    """
+    if default is not None and (value is None or (isinstance(value, Mapping) and not value)):
+        return default()
+    if isinstance(value, Mapping):
+        check_names(name, value, [declared.name for declared in fields(kind) if declared.init])
+        return kind(**value)
+    require_type(
+        isinstance(value, kind), f"{name} is {shown(value)}; it must be a {kind.__name__} or a mapping of its fields"
+    )
+    return value
+
+
+def check_names(name: str, given: Mapping[Any, Any], valid: Sequence[str]) -> None:
+    """Refuse a name that is none of the valid ones.
+
+    Raises:
+        TypeError: Naming it and the valid ones.
+    """
+    unknown = [key for key in given if not (isinstance(key, str) and key in valid)]
+    require_type(not unknown, f"{name} does not take {', '.join(map(shown, unknown))}; it takes {', '.join(valid)}")
+
+
+def check_array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return finite numbers as an array of floats.
+
+    Raises:
+        TypeError: If they are not real numbers: booleans, complex numbers, strings or objects.
+        ValueError: If the shape is another, or one of them is not finite.
+    """
+    array = as_array(value)
+    numeric = array.dtype.kind in "fiu" and array.dtype.itemsize <= 8
+    if not (numeric and array.shape == shape and _all_finite(array)):
+        problem = ValueError if numeric else TypeError
+        raise problem(f"{name} is {shown(value)}; it must be finite numbers of shape {shape}")
+    return array.astype(float)
+
+
+def as_array(value: Any) -> np.ndarray:
+    """Return an array of what has numbers, and one of objects from anything else."""
+    try:
+        return np.asarray(value)
+    except Exception:  # whatever an object raises when it is asked for its numbers
+        return np.empty(0, object)
+
+
+def check_seed(name: str, value: Any) -> int | None:
+    """Return a seed as an int; ``None`` stays ``None``.
+
+    Raises:
+        TypeError: If it is no whole number.
+        ValueError: If it is negative.
+    """
+    if value is None:
+        return None
+    message = f"{name} is {shown(value)}; it must be None or a whole number at least 0"
+    require_type(_is_number(value) and isinstance(value, Integral), message)
+    require(value >= 0, message)
+    return int(value)
+
+
+def is_listed(value: Any) -> bool:
+    """Return whether a value is a tuple, a list, or an array with a first axis."""
+    return isinstance(value, tuple | list) or (isinstance(value, np.ndarray) and value.ndim > 0)
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: its representation, cut where it is long."""
+    try:
+        text = repr(value)
+    except Exception:  # an integer of thousands of digits, or an object that cannot be shown
+        return f"a {type(value).__name__}"
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _finite(value: Any) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond the floats
+        return False
+
+
+def _all_finite(array: np.ndarray) -> bool:
+    if array.size < 16:  # faster than the loop of numpy, whose start costs more
+        return all(map(math.isfinite, array.ravel().tolist()))
+    return bool(np.isfinite(array).all())
