@@ -30,16 +30,6 @@ def require(condition: bool, message: str) -> None:
         raise ValueError(message)
 
 
-def require_type(condition: bool, message: str) -> None:
-    """Refuse what is not of a type.
-
-    Raises:
-        TypeError: With the message.
-    """
-    if not condition:
-        raise TypeError(message)
-
-
 def checked(default: Any, check: Callable[..., Any], /, **bounds: Any) -> Any:
     """Declare a dataclass field together with its check, which :func:`check_fields` runs.
 
@@ -111,18 +101,17 @@ def check_number(name: str, value: Any, **bounds: float) -> float:
         ValueError: If it is out of bounds, or not finite.
     """
     limits = Bounds(**bounds)
-    message = f"{name} is {shown(value)}; it must be a number {limits}"
-    require_type(_is_number(value), message)
-    require(_finite(value) and value in limits, message)
+    numeric = is_number(value)
+    if not (numeric and _finite(value) and value in limits):
+        raise refusal(name, value, f"a number {limits}", known=numeric)
     return float(value)
 
 
 def check_whole(name: str, value: Any, **bounds: float) -> int:
     """Return a whole number as an int; bounds and errors as :func:`check_number`."""
     limits = Bounds(**bounds)
-    message = f"{name} is {shown(value)}; it must be a whole number {limits}"
-    require_type(_is_number(value), message)
-    require(isinstance(value, Integral) and value in limits, message)
+    if not (is_number(value) and isinstance(value, Integral) and value in limits):
+        raise refusal(name, value, f"a whole number {limits}", known=is_number(value))
     return int(value)
 
 
@@ -139,20 +128,19 @@ def check_range(name: str, value: Any, *, whole: bool = False, **bounds: float) 
         TypeError: If it is anything else.
         ValueError: If an end is out of bounds or not finite, or the first exceeds the second.
     """
-    limits = Bounds(**bounds)
-    numbers = "whole numbers" if whole else "numbers"
-    message = f"{name} is {shown(value)}; it must be two {numbers} {limits}, the smaller one first"
-    require_type(is_listed(value) and len(value) == 2 and all(map(_is_number, value)), message)
-    fit = all(_finite(end) and end in limits and (not whole or isinstance(end, Integral)) for end in value)
-    require(fit and value[0] <= value[1], message)
+    limits, numbers = Bounds(**bounds), "whole numbers" if whole else "numbers"
+    paired = is_listed(value) and len(value) == 2 and all(map(is_number, value))
+    fits = paired and all(_finite(end) and end in limits and (not whole or isinstance(end, Integral)) for end in value)
+    if not (fits and value[0] <= value[1]):
+        raise refusal(name, value, f"two {numbers} {limits}, the smaller one first", known=paired)
     low, high = map(int if whole else float, value)
     return low, high
 
 
 def check_ranges(name: str, value: Any, *, bounds: Sequence[Mapping[str, Any]]) -> tuple[tuple[Any, Any], ...]:
     """Return several ranges as a tuple, each checked against bounds of its own."""
-    message = f"{name} is {shown(value)}; it must be {len(bounds)} ranges of two numbers each"
-    require_type(is_listed(value) and len(value) == len(bounds), message)
+    if not (is_listed(value) and len(value) == len(bounds)):
+        raise refusal(name, value, f"{len(bounds)} ranges of two numbers each", known=is_listed(value))
     return tuple(check_range(f"{name}[{k}]", ends, **bounds[k]) for k, ends in enumerate(value))
 
 
@@ -162,7 +150,8 @@ def check_flag(name: str, value: Any) -> bool:
     Raises:
         TypeError: If it is anything else.
     """
-    require_type(isinstance(value, bool | np.bool_), f"{name} is {shown(value)}; it must be True or False")
+    if not isinstance(value, bool | np.bool_):
+        raise refusal(name, value, "True or False", known=False)
     return bool(value)
 
 
@@ -173,10 +162,25 @@ def check_choice(name: str, value: Any, *, choices: Sequence[str]) -> str:
         TypeError: If it is no string.
         ValueError: If it is none of them.
     """
-    message = f"{name} is {shown(value)}; it must be {' or '.join(map(repr, choices))}"
-    require_type(isinstance(value, str), message)
-    require(value in choices, message)
+    if not (isinstance(value, str) and value in choices):
+        raise refusal(name, value, " or ".join(map(repr, choices)), known=isinstance(value, str))
     return str(value)
+
+
+def check_type(name: str, value: Any, kind: type[Any], what: str = "") -> None:
+    """Refuse what is of another type.
+
+    Args:
+        name: What it is called.
+        value: Anything.
+        kind: The type.
+        what: What the message says that it must be, if not the type's name.
+
+    Raises:
+        TypeError: If it is anything else.
+    """
+    if not isinstance(value, kind):
+        raise refusal(name, value, what or f"a {kind.__name__}", known=False)
 
 
 def check_instance(name: str, value: Any, *, kind: type[Any], default: Callable[[], Any] | None = None) -> Any:
@@ -191,9 +195,7 @@ def check_instance(name: str, value: Any, *, kind: type[Any], default: Callable[
     if isinstance(value, Mapping):
         check_names(name, value, [declared.name for declared in fields(kind) if declared.init])
         return kind(**value)
-    require_type(
-        isinstance(value, kind), f"{name} is {shown(value)}; it must be a {kind.__name__} or a mapping of its fields"
-    )
+    check_type(name, value, kind, f"a {kind.__name__} or a mapping of its fields")
     return value
 
 
@@ -203,8 +205,9 @@ def check_names(name: str, given: Mapping[Any, Any], valid: Sequence[str]) -> No
     Raises:
         TypeError: Naming it and the valid ones.
     """
-    unknown = [key for key in given if not (isinstance(key, str) and key in valid)]
-    require_type(not unknown, f"{name} does not take {', '.join(map(shown, unknown))}; it takes {', '.join(valid)}")
+    unknown = [shown(key) for key in given if not (isinstance(key, str) and key in valid)]
+    if unknown:
+        raise TypeError(f"{name} does not take {', '.join(unknown)}; it takes {', '.join(valid)}")
 
 
 def check_array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
@@ -217,9 +220,34 @@ def check_array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     array = as_array(value)
     numeric = array.dtype.kind in "fiu" and array.dtype.itemsize <= 8
     if not (numeric and array.shape == shape and _all_finite(array)):
-        problem = ValueError if numeric else TypeError
-        raise problem(f"{name} is {shown(value)}; it must be finite numbers of shape {shape}")
+        raise refusal(name, value, f"finite numbers of shape {shape}", known=numeric)
     return array.astype(float)
+
+
+def check_seed(name: str, value: Any) -> int | None:
+    """Return a seed as an int; ``None`` stays ``None``.
+
+    Raises:
+        TypeError: If it is no whole number.
+        ValueError: If it is negative.
+    """
+    whole = value is None or (is_number(value) and isinstance(value, Integral))
+    if not whole or (value is not None and value < 0):
+        raise refusal(name, value, "None or a whole number from 0 on", known=whole)
+    return None if value is None else int(value)
+
+
+def refusal(name: str, value: Any, bound: str, *, known: bool = True) -> TypeError | ValueError:
+    """Return the exception that refuses a value.
+
+    Args:
+        name: What it is called.
+        value: The value.
+        bound: What it must be.
+        known: Whether its type was right.
+    """
+    problem = ValueError if known else TypeError
+    return problem(f"{name} is {shown(value)}; it must be {bound}")
 
 
 def as_array(value: Any) -> np.ndarray:
@@ -230,19 +258,9 @@ def as_array(value: Any) -> np.ndarray:
         return np.empty(0, object)
 
 
-def check_seed(name: str, value: Any) -> int | None:
-    """Return a seed as an int; ``None`` stays ``None``.
-
-    Raises:
-        TypeError: If it is no whole number.
-        ValueError: If it is negative.
-    """
-    if value is None:
-        return None
-    message = f"{name} is {shown(value)}; it must be None or a whole number at least 0"
-    require_type(_is_number(value) and isinstance(value, Integral), message)
-    require(value >= 0, message)
-    return int(value)
+def is_number(value: Any) -> bool:
+    """Return whether a value is a real number, which a bool is not."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def is_listed(value: Any) -> bool:
@@ -257,10 +275,6 @@ def shown(value: Any) -> str:
     except Exception:  # an integer of thousands of digits, or an object that cannot be shown
         return f"a {type(value).__name__}"
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _finite(value: Any) -> bool:

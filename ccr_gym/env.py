@@ -15,9 +15,8 @@ from ccr_gym.checks import (
     check_names,
     check_number,
     check_seed,
-    require,
-    require_type,
-    shown,
+    check_type,
+    refusal,
 )
 from ccr_gym.fleet import Fleet, Reading, Truth
 from ccr_gym.observation import FORCE_SCALE_N
@@ -201,13 +200,13 @@ def make_settings(name: str, task: Any, given: dict[str, Any], others: Sequence[
 
 def _assignment(options: Any, task: Task) -> Assignment | None:
     """The scene and the set-point of options, or ``None`` if there are none."""
-    message = f"options is {shown(options)}; it must be None, or a mapping of both 'scene' and 'desired_force'"
-    require_type(options is None or isinstance(options, Mapping), message)
-    if not options:
+    known = options is None or isinstance(options, Mapping)
+    if known and not options:
         return None
-    require(set(options) == {"scene", "desired_force"}, message)
+    if not (known and set(options) == {"scene", "desired_force"}):
+        raise refusal("options", options, "None, or a mapping of both 'scene' and 'desired_force'", known=known)
     scene = options["scene"]
-    require_type(isinstance(scene, Scene), f"scene is {shown(scene)}; it must be a Scene")
+    check_type("scene", scene, Scene)
     shape = (task.body.model.space,) if task.force_vector else ()
     force = check_array("desired_force", options["desired_force"], shape)
     check_number("desired_force", math.hypot(*force) if shape else float(force), **SET_POINT)

@@ -12,9 +12,8 @@ from ccr_gym.checks import (
     check_number,
     checked,
     nested,
+    refusal,
     require,
-    require_type,
-    shown,
 )
 from ccr_gym.reward import RewardWeights
 from ccr_gym.sensing import Sensing
@@ -31,11 +30,10 @@ def check_sensing(name: str, value: Any) -> Any:
         TypeError: If it is anything else.
         ValueError: If it is another word, or as :class:`Sensing`.
     """
-    message = f"{name} is {shown(value)}; it must be 'ideal', 'realistic' or the fields of a Sensing"
-    if isinstance(value, str):
-        require(value in ("ideal", "realistic"), message)
+    if isinstance(value, str) and value in ("ideal", "realistic"):
         return value
-    require_type(isinstance(value, Sensing | Mapping), message)
+    if not isinstance(value, Sensing | Mapping):
+        raise refusal(name, value, "'ideal', 'realistic' or the fields of a Sensing", known=isinstance(value, str))
     return check_instance(name, value, kind=Sensing)
 
 

@@ -17,11 +17,10 @@ from ccr_gym.checks import (
     check_number,
     check_range,
     check_ranges,
+    check_type,
     check_whole,
     checked,
-    require,
-    require_type,
-    shown,
+    refusal,
 )
 from ccr_gym.observation import FORCE_SCALE_N
 from solver import Circle, HalfPlane, Robot, Scene
@@ -298,7 +297,7 @@ def check_task(task: Any) -> None:
         TypeError: If it is no task, or one of them is no number.
         ValueError: If one of them is out of range.
     """
-    require_type(isinstance(task, Task), f"task is {shown(task)}; it must be a Task")
+    check_type("task", task, Task)
     check_whole("obstacles of the task", task.obstacles, low=1, high=MAX_OBSTACLES)
     check_whole("steps of the task", task.steps, low=1)
     if task.target is not None:
@@ -391,12 +390,13 @@ def _draw(task: Task, robot: Any, generator: np.random.Generator, split: str) ->
 
 
 def _check_drawn(task: Task, drawn: Any) -> None:
-    require_type(isinstance(drawn, Assignment), f"{task} drew {shown(drawn)}; it must draw an Assignment")
-    require_type(isinstance(drawn.scene, Scene), f"{task} drew the scene {shown(drawn.scene)}; it must be a Scene")
-    count = len(drawn.scene)
-    require(count == task.obstacles, f"{task} drew {count} obstacles; its scenes must have {task.obstacles}")
+    check_type("what the task draws", drawn, Assignment)
+    check_type("scene of a draw", drawn.scene, Scene)
+    if len(drawn.scene) != task.obstacles:
+        raise refusal("scene of a draw", drawn.scene, f"a Scene of {task.obstacles} obstacles, as the task declares")
     check_number("desired_force of a draw", drawn.desired_force, **SET_POINT)
     check_array("pull of a draw", drawn.pull, (task.body.model.cables,))
     if drawn.course is not None:
         course = check_array("course of a draw", drawn.course, (COURSE_STEPS,))
-        require(bool((course > 0).all() and (course <= 1).all()), f"{task} drew a course that is not in 0 to 1")
+        if not ((course > 0).all() and (course <= 1).all()):
+            raise refusal("course of a draw", drawn.course, "above 0 and at most 1 at every step")

@@ -17,8 +17,8 @@ from ccr_gym.checks import (
     check_seed,
     check_whole,
     is_listed,
+    refusal,
     require,
-    require_type,
     shown,
 )
 from ccr_gym.env import METADATA, Observation, make_settings, single_spaces
@@ -178,16 +178,15 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
     def _mask(self, options: Any) -> np.ndarray:
         """Which environments to reset."""
-        message = f"options has {shown(options)}; it must be None or a mapping of 'reset_mask' only"
-        require_type(options is None or isinstance(options, Mapping), message)
-        mask = np.ones(self.num_envs, bool)
-        if options:
-            require(set(options) == {"reset_mask"}, message)
-            mask = as_array(options["reset_mask"])
-            require(
-                mask.shape == (self.num_envs,) and mask.dtype == bool and bool(mask.any()),
-                f"reset_mask is {shown(mask)}; it must be an array of {self.num_envs} bools, one of them true",
-            )
+        known = options is None or isinstance(options, Mapping)
+        if known and not options:
+            return np.ones(self.num_envs, bool)
+        if not (known and set(options) == {"reset_mask"}):
+            raise refusal("options", options, "None, or a mapping of 'reset_mask' only", known=known)
+        mask = as_array(options["reset_mask"])
+        if not (mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()):
+            bound = f"an array of {self.num_envs} bools, one of them true"
+            raise refusal("reset_mask", options["reset_mask"], bound, known=mask.dtype == bool)
         require(self._started or bool(mask.all()), "reset_mask is not all true; the first reset must be of all")
         return mask
 
