@@ -1,23 +1,26 @@
 """Refusals at the boundary: every message names the field, its value and what it must be.
 
+A value that a field cannot have is a ValueError, whatever its type; an object of another class, or a name that there is
+not, is a TypeError.
+
 A dataclass declares the check of a field beside its default, and runs all of them when it is made::
 
     @dataclass(frozen=True, slots=True)
     class MyTask(Task):
-        radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, above=0)
+        radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, low=SMALLEST)
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
-from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
-LARGEST = 1e100  # of any number, so that squares and ratios stay finite
-LONGEST = 200  # characters of a value in a message
+SMALLEST, LARGEST = 1e-30, 1e30  # of positive numbers, so that products of several stay finite
+SHOWN = 200  # characters of a value in a message
+REAL = (int, float, np.integer, np.floating)
 
 
 def require(condition: bool, message: str) -> None:
@@ -54,7 +57,7 @@ def check_fields(instance: Any) -> None:
     """Check the fields of a dataclass that were declared with :func:`checked`, and keep what the checks return.
 
     Raises:
-        TypeError: If a value is of the wrong type.
+        TypeError: If a value should be an object of another class.
         ValueError: If a value is out of its bounds.
     """
     for declared in fields(instance):
@@ -69,26 +72,24 @@ class Bounds:
     Attributes:
         low: Smallest value.
         high: Largest value.
-        above: Value that it must exceed, instead of ``low``.
         below: Value that it must stay under, instead of ``high``.
+        reason: Where the bounds come from, for the message.
     """
 
     low: float = -LARGEST
     high: float = LARGEST
-    above: float | None = None
     below: float | None = None
+    reason: str = ""
 
     def __contains__(self, value: Any) -> bool:
-        inside = self.low <= value <= self.high
-        return inside and (self.above is None or value > self.above) and (self.below is None or value < self.below)
+        return self.low <= value <= self.high and (self.below is None or value < self.below)
 
     def __str__(self) -> str:
-        least = f"at least {self.low:g}" if self.above is None else f"above {self.above:g}"
-        most = f"at most {self.high:g}" if self.below is None else f"below {self.below:g}"
-        return f"{least} and {most}"
+        most = f"{self.high:.10g}" if self.below is None else f"below {self.below:.10g}"
+        return f"from {self.low:.10g} to {most}" + (f" ({self.reason})" if self.reason else "")
 
 
-def check_number(name: str, value: Any, **bounds: float) -> float:
+def check_number(name: str, value: Any, **bounds: Any) -> float:
     """Return a number as a float.
 
     Args:
@@ -97,25 +98,23 @@ def check_number(name: str, value: Any, **bounds: float) -> float:
         **bounds: As :class:`Bounds`.
 
     Raises:
-        TypeError: If it is no number.
-        ValueError: If it is out of bounds, or not finite.
+        ValueError: If it is no number, out of bounds, or not finite.
     """
     limits = Bounds(**bounds)
-    numeric = is_number(value)
-    if not (numeric and _finite(value) and value in limits):
-        raise refusal(name, value, f"a number {limits}", known=numeric)
+    if not (is_real(value) and _finite(value) and value in limits):
+        raise refusal(name, value, f"a number {limits}")
     return float(value)
 
 
-def check_whole(name: str, value: Any, **bounds: float) -> int:
+def check_whole(name: str, value: Any, **bounds: Any) -> int:
     """Return a whole number as an int; bounds and errors as :func:`check_number`."""
     limits = Bounds(**bounds)
-    if not (is_number(value) and isinstance(value, Integral) and value in limits):
-        raise refusal(name, value, f"a whole number {limits}", known=is_number(value))
+    if not (_is_whole(value) and value in limits):
+        raise refusal(name, value, f"a whole number {limits}")
     return int(value)
 
 
-def check_range(name: str, value: Any, *, whole: bool = False, **bounds: float) -> tuple[Any, Any]:
+def check_range(name: str, value: Any, *, whole: bool = False, **bounds: Any) -> tuple[Any, Any]:
     """Return the ends of a range as a tuple of two numbers that do not descend; both may be equal.
 
     Args:
@@ -125,14 +124,13 @@ def check_range(name: str, value: Any, *, whole: bool = False, **bounds: float) 
         **bounds: As :class:`Bounds`.
 
     Raises:
-        TypeError: If it is anything else.
-        ValueError: If an end is out of bounds or not finite, or the first exceeds the second.
+        ValueError: If it is anything else, an end is out of bounds or not finite, or the first exceeds the second.
     """
     limits, numbers = Bounds(**bounds), "whole numbers" if whole else "numbers"
-    paired = is_listed(value) and len(value) == 2 and all(map(is_number, value))
-    fits = paired and all(_finite(end) and end in limits and (not whole or isinstance(end, Integral)) for end in value)
-    if not (fits and value[0] <= value[1]):
-        raise refusal(name, value, f"two {numbers} {limits}, the smaller one first", known=paired)
+    known = _is_whole if whole else is_real
+    paired = is_listed(value) and len(value) == 2 and all(map(known, value))
+    if not (paired and all(_finite(end) and end in limits for end in value) and value[0] <= value[1]):
+        raise refusal(name, value, f"two {numbers} {limits}, the smaller one first")
     low, high = map(int if whole else float, value)
     return low, high
 
@@ -140,7 +138,7 @@ def check_range(name: str, value: Any, *, whole: bool = False, **bounds: float) 
 def check_ranges(name: str, value: Any, *, bounds: Sequence[Mapping[str, Any]]) -> tuple[tuple[Any, Any], ...]:
     """Return several ranges as a tuple, each checked against bounds of its own."""
     if not (is_listed(value) and len(value) == len(bounds)):
-        raise refusal(name, value, f"{len(bounds)} ranges of two numbers each", known=is_listed(value))
+        raise refusal(name, value, f"{len(bounds)} ranges of two numbers each")
     return tuple(check_range(f"{name}[{k}]", ends, **bounds[k]) for k, ends in enumerate(value))
 
 
@@ -148,10 +146,10 @@ def check_flag(name: str, value: Any) -> bool:
     """Return a truth value as a bool.
 
     Raises:
-        TypeError: If it is anything else.
+        ValueError: If it is anything else.
     """
     if not isinstance(value, bool | np.bool_):
-        raise refusal(name, value, "True or False", known=False)
+        raise refusal(name, value, "True or False")
     return bool(value)
 
 
@@ -159,28 +157,27 @@ def check_choice(name: str, value: Any, *, choices: Sequence[str]) -> str:
     """Return a word that is one of some.
 
     Raises:
-        TypeError: If it is no string.
         ValueError: If it is none of them.
     """
     if not (isinstance(value, str) and value in choices):
-        raise refusal(name, value, " or ".join(map(repr, choices)), known=isinstance(value, str))
+        raise refusal(name, value, " or ".join(map(repr, choices)))
     return str(value)
 
 
-def check_type(name: str, value: Any, kind: type[Any], what: str = "") -> None:
+def check_type(name: str, value: Any, kind: Any, what: str = "") -> None:
     """Refuse what is of another type.
 
     Args:
         name: What it is called.
         value: Anything.
-        kind: The type.
+        kind: The type, or a union of types.
         what: What the message says that it must be, if not the type's name.
 
     Raises:
         TypeError: If it is anything else.
     """
     if not isinstance(value, kind):
-        raise refusal(name, value, what or f"a {kind.__name__}", known=False)
+        raise refusal(name, value, what or f"a {kind.__name__}", TypeError)
 
 
 def check_instance(name: str, value: Any, *, kind: type[Any], default: Callable[[], Any] | None = None) -> Any:
@@ -214,13 +211,13 @@ def check_array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Return finite numbers as an array of floats.
 
     Raises:
-        TypeError: If they are not real numbers: booleans, complex numbers, strings or objects.
-        ValueError: If the shape is another, or one of them is not finite.
+        ValueError: If they are not real numbers (booleans, complex numbers, strings and objects are not), the shape is
+            another, or one of them is not finite.
     """
     array = as_array(value)
     numeric = array.dtype.kind in "fiu" and array.dtype.itemsize <= 8
     if not (numeric and array.shape == shape and _all_finite(array)):
-        raise refusal(name, value, f"finite numbers of shape {shape}", known=numeric)
+        raise refusal(name, value, f"finite numbers of shape {shape}")
     return array.astype(float)
 
 
@@ -228,26 +225,18 @@ def check_seed(name: str, value: Any) -> int | None:
     """Return a seed as an int; ``None`` stays ``None``.
 
     Raises:
-        TypeError: If it is no whole number.
-        ValueError: If it is negative.
+        ValueError: If it is no whole number, or negative.
     """
-    whole = value is None or (is_number(value) and isinstance(value, Integral))
-    if not whole or (value is not None and value < 0):
-        raise refusal(name, value, "None or a whole number from 0 on", known=whole)
-    return None if value is None else int(value)
+    if value is None:
+        return None
+    if not (_is_whole(value) and value >= 0):
+        raise refusal(name, value, "None or a whole number from 0 on")
+    return int(value)
 
 
-def refusal(name: str, value: Any, bound: str, *, known: bool = True) -> TypeError | ValueError:
-    """Return the exception that refuses a value.
-
-    Args:
-        name: What it is called.
-        value: The value.
-        bound: What it must be.
-        known: Whether its type was right.
-    """
-    problem = ValueError if known else TypeError
-    return problem(f"{name} is {shown(value)}; it must be {bound}")
+def refusal(name: str, value: Any, bound: str, kind: type[Exception] = ValueError) -> Exception:
+    """Return the exception that says what a value is, and what it must be."""
+    return kind(f"{name} is {shown(value)}; it must be {bound}")
 
 
 def as_array(value: Any) -> np.ndarray:
@@ -258,9 +247,9 @@ def as_array(value: Any) -> np.ndarray:
         return np.empty(0, object)
 
 
-def is_number(value: Any) -> bool:
-    """Return whether a value is a real number, which a bool is not."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+def is_real(value: Any) -> bool:
+    """Return whether a value is a Python or numpy number, neither a bool, nor complex, nor an array."""
+    return isinstance(value, REAL) and not isinstance(value, bool | np.timedelta64)
 
 
 def is_listed(value: Any) -> bool:
@@ -274,7 +263,11 @@ def shown(value: Any) -> str:
         text = repr(value)
     except Exception:  # an integer of thousands of digits, or an object that cannot be shown
         return f"a {type(value).__name__}"
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+
+
+def _is_whole(value: Any) -> bool:
+    return is_real(value) and isinstance(value, int | np.integer)
 
 
 def _finite(value: Any) -> bool:

@@ -41,7 +41,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         **settings: Fields of :class:`ccr_gym.settings.Settings`.
 
     Raises:
-        TypeError: If an argument is of the wrong type, or there is no argument of that name.
+        TypeError: If there is no argument of that name, or one should be an object of another class.
         ValueError: If an argument is out of range; the message names the bound.
     """
 
@@ -72,8 +72,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
         Raises:
             RuntimeError: If the task and the robot do not fit: no draw of many is feasible.
-            TypeError: If an argument is of the wrong type.
-            ValueError: If the seed is negative, or the options are incomplete or out of range.
+            TypeError: If the options are no mapping, or the scene is no Scene.
+            ValueError: If the seed is no whole number from 0 on, or the options are incomplete or out of range.
         """
         seed = check_seed("seed", seed)
         given = _assignment(options, self.task)
@@ -98,8 +98,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
-            TypeError: If the action is not made of real numbers; the state stays as it was.
-            ValueError: If the action has the wrong shape or is not finite; the state stays as it was.
+            ValueError: If the action is not finite real numbers of the right shape; the state stays as it was.
         """
         self._check_started("step")
         pull = check_array("action", action, self._shape)
@@ -155,8 +154,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
-            TypeError: If the places are not made of real numbers.
-            ValueError: If they have the wrong shape or are not finite.
+            ValueError: If the places are not finite real numbers of the right shape.
         """
         self._check_started("probe")
         return np.asarray(self._fleet.probe(check_array("places", places, self._shape)[None])[0])
@@ -188,7 +186,7 @@ def make_settings(name: str, task: Any, given: dict[str, Any], others: Sequence[
         others: Its arguments that are no settings, for the message about one of another name.
 
     Raises:
-        TypeError: If there is no argument of that name, or one is of the wrong type.
+        TypeError: If there is no argument of that name, or one should be an object of another class.
         ValueError: If one is out of range.
     """
     check_task(task)
@@ -200,14 +198,19 @@ def make_settings(name: str, task: Any, given: dict[str, Any], others: Sequence[
 
 def _assignment(options: Any, task: Task) -> Assignment | None:
     """The scene and the set-point of options, or ``None`` if there are none."""
-    known = options is None or isinstance(options, Mapping)
-    if known and not options:
+    wanted = "None, or a mapping of both 'scene' and 'desired_force'"
+    check_type("options", options, Mapping | None, wanted)
+    if not options:
         return None
-    if not (known and set(options) == {"scene", "desired_force"}):
-        raise refusal("options", options, "None, or a mapping of both 'scene' and 'desired_force'", known=known)
+    if set(options) != {"scene", "desired_force"}:
+        raise refusal("options", options, wanted)
     scene = options["scene"]
     check_type("scene", scene, Scene)
-    shape = (task.body.model.space,) if task.force_vector else ()
+    space = task.body.model.space
+    if any(obstacle.space != space for obstacle in scene):
+        kinds = ("of the plane", "in space")
+        raise refusal("scene", scene, "of obstacles {}, not {}".format(*kinds if space == 2 else kinds[::-1]))
+    shape = (space,) if task.force_vector else ()
     force = check_array("desired_force", options["desired_force"], shape)
     check_number("desired_force", math.hypot(*force) if shape else float(force), **SET_POINT)
     return Assignment(scene, force)

@@ -23,8 +23,7 @@ class RewardWeights:
         effort: Squared action.
 
     Raises:
-        TypeError: If a weight is no number.
-        ValueError: If a weight is negative, beyond 1e6 or not finite.
+        ValueError: If a weight is no number, negative, or beyond 1e6.
     """
 
     force_error: float = checked(1.0, check_number, low=0, high=MAX_WEIGHT)

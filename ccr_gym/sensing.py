@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ccr_gym.checks import check_fields, check_range, checked
+from ccr_gym.checks import SMALLEST, check_fields, check_range, checked
 
 if TYPE_CHECKING:
     from ccr_gym.bodies import Body
@@ -33,8 +33,7 @@ class Sensing:
         stiffness: Rigidity of the robot over the one that is known; forces grow with it, shapes do not change.
 
     Raises:
-        TypeError: If a range is not two numbers.
-        ValueError: If a range descends, or goes beyond what is possible; the message names the bound.
+        ValueError: If a range is not two numbers, descends, or goes beyond what is possible.
     """
 
     latency: tuple[int, ...] = checked((1, 4), check_range, whole=True, low=0, high=HISTORY - 1)
@@ -42,7 +41,7 @@ class Sensing:
     bias_n: Range = checked((0.0, 0.003), check_range, low=0)
     backlash_mm: Range = checked((0.2, 0.6), check_range, low=0)
     friction: Range = checked((0.0, 0.3), check_range, low=0, high=0.9)
-    stiffness: Range = checked((0.3, 3.0), check_range, above=0)
+    stiffness: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
 
     def __post_init__(self) -> None:
         check_fields(self)

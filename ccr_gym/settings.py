@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from ccr_gym.checks import (
+    SMALLEST,
     check_choice,
     check_fields,
     check_flag,
@@ -33,7 +34,8 @@ def check_sensing(name: str, value: Any) -> Any:
     if isinstance(value, str) and value in ("ideal", "realistic"):
         return value
     if not isinstance(value, Sensing | Mapping):
-        raise refusal(name, value, "'ideal', 'realistic' or the fields of a Sensing", known=isinstance(value, str))
+        kind = ValueError if isinstance(value, str) else TypeError
+        raise refusal(name, value, "'ideal', 'realistic' or the fields of a Sensing", kind)
     return check_instance(name, value, kind=Sensing)
 
 
@@ -56,17 +58,17 @@ class Settings:
         split: Which scenes are drawn: ``"train"``, ``"test"``, which no training scene is in, or ``"all"``.
 
     Raises:
-        TypeError: If an argument is of the wrong type.
+        TypeError: If an argument should be an object of another class.
         ValueError: If an argument is out of range; the message names the bound.
     """
 
     robot: Any = nested(Robot, Robot.prototype)
     obs_mode: Literal["dict", "flat"] = checked("dict", check_choice, choices=("dict", "flat"))
     force_sensor: bool = checked(True, check_flag)
-    max_increment_mm: float = checked(0.5, check_number, above=0)
-    cable_limit_mm: float = checked(14.0, check_number, above=0)
+    max_increment_mm: float = checked(0.5, check_number, low=SMALLEST)
+    cable_limit_mm: float = checked(14.0, check_number, low=SMALLEST)
     friction: float = checked(0.0, check_number, low=0, high=MAX_FRICTION)
-    force_limit: float = checked(0.3, check_number, above=0)
+    force_limit: float = checked(0.3, check_number, low=SMALLEST)
     weights: RewardWeights = nested(RewardWeights)
     backend: Literal["native", "casadi"] = checked("native", check_choice, choices=("native", "casadi"))
     sensing: Any = checked("ideal", check_sensing)
@@ -107,7 +109,7 @@ class InsertionSettings(Settings):
     """
 
     robot: Any = nested(Robot, _insertable)
-    max_insertion_mm: float = checked(1.0, check_number, above=0)
+    max_insertion_mm: float = checked(1.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
         Settings.__post_init__(self)
@@ -127,7 +129,7 @@ class SpatialSettings(Settings):
     """
 
     robot: Any = nested(SpatialRobot, SpatialRobot.prototype)
-    cable_limit_mm: float = checked(10.0, check_number, above=0)
+    cable_limit_mm: float = checked(10.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
         Settings.__post_init__(self)

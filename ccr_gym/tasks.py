@@ -11,6 +11,7 @@ import numpy as np
 
 from ccr_gym.bodies import IN_PLANE, IN_SPACE, INSERTED, Body
 from ccr_gym.checks import (
+    SMALLEST,
     check_array,
     check_fields,
     check_flag,
@@ -34,8 +35,8 @@ HALF_CYLINDER_MM = 30.0
 COURSE_STEPS = 128  # of a set-point that moves
 TEST_SHARE = 5  # one scene in so many is a test scene
 PROBE_MM = 0.5  # cable displacement between the equilibria of a trial pull
-SET_POINT = {"low": 1e-6 * FORCE_SCALE_N, "high": FORCE_SCALE_N}  # what the observation can show [N]
-CIRCLE: tuple[dict[str, float], ...] = ({}, {}, {"above": 0.0})  # bounds of x, y and radius
+SET_POINT = {"low": 1e-6 * FORCE_SCALE_N, "high": FORCE_SCALE_N, "reason": "what the observation can show, in N"}
+CIRCLE: tuple[dict[str, float], ...] = ({}, {}, {"low": SMALLEST})  # bounds of x, y and radius
 
 
 class Assignment(NamedTuple):
@@ -101,7 +102,7 @@ class LoadCell(Task):
         force_n: Range of the desired force [N].
     """
 
-    distance_mm: tuple[float, float] = checked((24.0, 51.0), check_range, above=0)
+    distance_mm: tuple[float, float] = checked((24.0, 51.0), check_range, low=SMALLEST)
     height_mm: float = checked(127.0, check_number)
     force_n: tuple[float, float] = checked((0.01, 0.06), check_range, **SET_POINT)
 
@@ -126,7 +127,7 @@ class PushObstacle(Task):
 
     x_mm: tuple[float, float] = checked((35.0, 75.0), check_range)
     y_mm: tuple[float, float] = checked((75.0, 150.0), check_range)
-    radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, above=0)
+    radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, low=SMALLEST)
     force_n: tuple[float, float] = checked((0.02, 0.15), check_range, **SET_POINT)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
@@ -209,7 +210,7 @@ class SoftObstacle(PushObstacle):
         stiffness: Range of the spring's stiffness, drawn evenly in its logarithm [N/mm].
     """
 
-    stiffness: tuple[float, float] = checked((0.003, 0.1), check_range, above=0)
+    stiffness: tuple[float, float] = checked((0.003, 0.1), check_range, low=SMALLEST)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
@@ -247,7 +248,7 @@ class SpatialPush(Task):
 
     distance_mm: tuple[float, float] = checked((35.0, 65.0), check_range, low=0)
     height_mm: tuple[float, float] = checked((80.0, 150.0), check_range)
-    radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, above=0)
+    radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, low=SMALLEST)
     cylinders: float = checked(0.5, check_number, low=0, high=1)
     tilt: float = checked(math.pi / 6, check_number, low=0, high=math.pi / 2)
     force_n: tuple[float, float] = checked((0.02, 0.15), check_range, **SET_POINT)
@@ -294,8 +295,8 @@ def check_task(task: Any) -> None:
     """Refuse what is no task, or one whose obstacles, target or steps make no sense.
 
     Raises:
-        TypeError: If it is no task, or one of them is no number.
-        ValueError: If one of them is out of range.
+        TypeError: If it is no task.
+        ValueError: If one of them is no whole number, or out of range.
     """
     check_type("task", task, Task)
     check_whole("obstacles of the task", task.obstacles, low=1, high=MAX_OBSTACLES)
@@ -305,13 +306,16 @@ def check_task(task: Any) -> None:
 
 
 def check_robot(task: Task, robot: Any) -> None:
-    """Refuse a robot that some obstacle of a task could slip through.
+    """Refuse a robot that some obstacle of a task could slip through, and a task whose narrowest obstacles are none.
 
     Raises:
-        ValueError: Naming the obstacle, its width and what the robot needs.
+        ValueError: Naming the task, the obstacle, its width and what the robot needs.
     """
-    for scene in task.narrowest():
-        check_width(robot, scene)
+    try:
+        for scene in task.narrowest():
+            check_width(robot, scene)
+    except ValueError as error:
+        raise ValueError(f"the narrowest obstacles of {task} cannot be: {error}") from error
 
 
 def uniform(generator: np.random.Generator, *ranges: tuple[float, float]) -> list[float]:

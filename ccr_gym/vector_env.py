@@ -15,6 +15,7 @@ from ccr_gym.checks import (
     check_array,
     check_choice,
     check_seed,
+    check_type,
     check_whole,
     is_listed,
     refusal,
@@ -49,7 +50,7 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         **settings: Fields of :class:`ccr_gym.settings.Settings`.
 
     Raises:
-        TypeError: If an argument is of the wrong type, or there is no argument of that name.
+        TypeError: If there is no argument of that name, or one should be an object of another class.
         ValueError: If an argument is out of range; the message names the bound.
     """
 
@@ -66,7 +67,9 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         require(render_mode is None, f"render_mode is {shown(render_mode)}; use vectorization_mode='sync' to render")
         self.task, self.settings = task, make_settings(type(self).__name__, task, settings, ARGUMENTS)
         self.num_envs = num_envs = check_whole("num_envs", num_envs, low=1, high=MAX_ENVS)
-        threads = check_whole("threads", threads, low=1, high=THREADS_PER_CORE * (os.cpu_count() or 1))
+        most = THREADS_PER_CORE * (os.cpu_count() or 1)
+        reason = f"{THREADS_PER_CORE} for each core of this machine"
+        threads = check_whole("threads", threads, low=1, high=most, reason=reason)
         steps = task.steps if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = check_whole("max_episode_steps", steps, low=1, high=MAX_STEPS)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
@@ -94,7 +97,7 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
         Raises:
             RuntimeError: If the task and the robot do not fit: no draw of many is feasible.
-            TypeError: If an argument is of the wrong type.
+            TypeError: If the options are no mapping.
             ValueError: If there is not one seed for each environment, or the options are something else.
         """
         seeds, mask = self._seeds(seed), self._mask(options)
@@ -114,8 +117,7 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset, or after the end of an episode if nothing resets it.
-            TypeError: If the actions are not made of real numbers; the state stays as it was.
-            ValueError: If the actions have the wrong shape or one is not finite; the state stays as it was.
+            ValueError: If the actions are not finite real numbers of the right shape; the state stays as it was.
         """
         disabled = self.autoreset_mode is AutoresetMode.DISABLED
         if not self._started or (disabled and self._ended.any()):
@@ -158,8 +160,7 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
-            TypeError: If the places are not made of real numbers.
-            ValueError: If they have the wrong shape or are not finite.
+            ValueError: If the places are not finite real numbers of the right shape.
         """
         self._check_started("probe")
         return self._fleet.probe(check_array("places", places, self._shape))
@@ -178,15 +179,15 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
     def _mask(self, options: Any) -> np.ndarray:
         """Which environments to reset."""
-        known = options is None or isinstance(options, Mapping)
-        if known and not options:
+        wanted = "None, or a mapping of 'reset_mask' only"
+        check_type("options", options, Mapping | None, wanted)
+        if not options:
             return np.ones(self.num_envs, bool)
-        if not (known and set(options) == {"reset_mask"}):
-            raise refusal("options", options, "None, or a mapping of 'reset_mask' only", known=known)
+        if set(options) != {"reset_mask"}:
+            raise refusal("options", options, wanted)
         mask = as_array(options["reset_mask"])
         if not (mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()):
-            bound = f"an array of {self.num_envs} bools, one of them true"
-            raise refusal("reset_mask", options["reset_mask"], bound, known=mask.dtype == bool)
+            raise refusal("reset_mask", options["reset_mask"], f"an array of {self.num_envs} bools, one of them true")
         require(self._started or bool(mask.all()), "reset_mask is not all true; the first reset must be of all")
         return mask
 
