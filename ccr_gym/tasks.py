@@ -394,7 +394,7 @@ def _draw(task: Task, robot: Any, generator: np.random.Generator, split: str) ->
 
 
 def _check_drawn(task: Task, drawn: Any) -> None:
-    check_type("what the task draws", drawn, Assignment)
+    check_type("what the task draws", drawn, Assignment, "an Assignment")
     check_type("scene of a draw", drawn.scene, Scene)
     if len(drawn.scene) != task.obstacles:
         raise refusal("scene of a draw", drawn.scene, f"a Scene of {task.obstacles} obstacles, as the task declares")

@@ -314,7 +314,7 @@ def raising(_):
 
 
 MOODS = {
-    "no assignment": (lambda plain: None, TypeError, "what the task draws is None; it must be a Assignment"),
+    "no assignment": (lambda plain: None, TypeError, "what the task draws is None; it must be an Assignment"),
     "no scene": (lambda plain: plain._replace(scene=[]), TypeError, "scene of a draw is"),
     "two obstacles": (lambda plain: plain._replace(scene=scene_of(PUSH, 2)), ValueError, "a Scene of 1 obstacles"),
     "no force": (lambda plain: plain._replace(desired_force=NAN), ValueError, "desired_force of a draw is nan"),
