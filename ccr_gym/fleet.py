@@ -16,7 +16,6 @@ from ccr_gym.reward import TERMS, reward_terms
 from ccr_gym.sensing import Senses
 from ccr_gym.settings import Settings
 from ccr_gym.tasks import COURSE_STEPS, Assignment, Task, assign, check_robot
-from solver import Scene
 from solver.batch import BaseBatch
 from solver.layout import SPACE, Layout
 from solver.solve import Solver
@@ -107,7 +106,7 @@ class Fleet:
         self._effort = np.zeros(count) if self.body.actions == 1 else np.zeros((count, self.body.actions))
         self._seen = np.zeros((count, self.body.obstacle_size))
         self._time = np.zeros(count, int)  # steps of the episode
-        self._scenes: list[Scene | None] = [None] * count  # of the episodes
+        self._trial = self.body.batch(settings, count, task.obstacles, threads)  # where scenes are tried out
         self._enter(self._make_room(task.obstacles))
 
     def _make_room(self, obstacles: int) -> Room:
@@ -134,27 +133,13 @@ class Fleet:
         Raises:
             RuntimeError: As :func:`ccr_gym.tasks.assign`; episodes and generators stay as they were.
         """
-        room, settings = self._room_for(self._task.obstacles), self._settings
-        with self._restored_on_error(room.solver, robots, generators):
-            forces, drawn = assign(self._task, room.solver, robots, generators, settings.cable_limit_mm, settings.split)
-        self._enter(room)
+        settings = self._settings
+        with _restored_on_error(generators):
+            forces, drawn = assign(self._task, self._trial, robots, generators, settings.cable_limit_mm, settings.split)
+        self._enter(self._room_for(self._task.obstacles))
+        for robot, assignment in zip(robots, drawn, strict=True):
+            self.solver.assign(robot, assignment.scene)
         self._begin(robots, forces, drawn, generators)
-
-    @contextmanager
-    def _restored_on_error(
-        self, solver: BaseBatch, robots: Sequence[int], generators: Sequence[np.random.Generator]
-    ) -> Iterator[None]:
-        """Put robots back among their obstacles, and generators back to where they were, after any exception."""
-        states = [generator.bit_generator.state for generator in generators]
-        try:
-            yield
-        except BaseException:
-            for robot, generator, state in zip(robots, generators, states, strict=True):
-                generator.bit_generator.state = state
-                scene = self._scenes[robot]
-                if scene is not None and solver is self.solver:
-                    solver.assign(robot, scene)
-            raise
 
     def give(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
         """Start a given episode of a robot; what else there is of it is drawn by its generator.
@@ -185,8 +170,6 @@ class Fleet:
             self.peaks[robots] = _norm(forces)
         self.solver.rest(robots)
         self._effort[robots], self._time[robots] = 0.0, 0
-        for robot, assignment in zip(robots, assignments, strict=True):
-            self._scenes[robot] = assignment.scene
         if self._courses is None and self._senses is None and not self.body.obstacle_size:
             return
         for robot, assignment, generator in zip(robots, assignments, generators, strict=True):
@@ -312,6 +295,18 @@ class Fleet:
     def equilibrium(self, robot: int) -> Any:
         """A robot's present equilibrium; immutable."""
         return self.solver.equilibrium(robot)
+
+
+@contextmanager
+def _restored_on_error(generators: Sequence[np.random.Generator]) -> Iterator[None]:
+    """Put generators back to where they were after any exception."""
+    states = [generator.bit_generator.state for generator in generators]
+    try:
+        yield
+    except BaseException:
+        for generator, state in zip(generators, states, strict=True):
+            generator.bit_generator.state = state
+        raise
 
 
 def _norm(forces: np.ndarray) -> Any:

@@ -340,7 +340,7 @@ def assign(
 
     Args:
         task: Where scenes and forces are drawn from.
-        solver: The robots; those named are assigned to their scenes.
+        solver: Robots to try scenes with; those named are assigned to theirs.
         robots: Which.
         generators: One for each of them.
         cable_limit_mm: Largest cable displacement that may be needed [mm].
