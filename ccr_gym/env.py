@@ -1,20 +1,31 @@
 """The single environment."""
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any, SupportsFloat
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from ccr_gym.checks import require
+from ccr_gym.checks import (
+    check_array,
+    check_choice,
+    check_names,
+    check_number,
+    check_seed,
+    check_type,
+    refusal,
+)
 from ccr_gym.fleet import Fleet, Reading, Truth
 from ccr_gym.observation import FORCE_SCALE_N
 from ccr_gym.rendering import Frame, Renderer, draw_plane
 from ccr_gym.reward import TERMS
 from ccr_gym.settings import Settings
 from ccr_gym.spatial_rendering import draw_space
-from ccr_gym.tasks import Assignment, Task
+from ccr_gym.tasks import SET_POINT, Assignment, Task, check_task
+from solver import Scene
 
 Observation = np.ndarray | dict[str, np.ndarray]
 WORLDS = {2: draw_plane, 3: draw_space}
@@ -30,41 +41,52 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         **settings: Fields of :class:`ccr_gym.settings.Settings`.
 
     Raises:
+        TypeError: If there is no argument of that name, or one should be an object of another class.
         ValueError: If an argument is out of range; the message names the bound.
     """
 
     metadata = METADATA
 
     def __init__(self, task: Task, render_mode: str | None = None, **settings: Any) -> None:
-        require(
-            render_mode is None or render_mode in self.metadata["render_modes"],
-            f"render_mode is {render_mode!r}; it must be None or one of {self.metadata['render_modes']}",
-        )
-        self.task, self.settings, self.render_mode = task, task.body.settings(**settings), render_mode
+        if render_mode is not None:
+            check_choice("render_mode", render_mode, choices=METADATA["render_modes"])
+        self.task, self.render_mode = task, render_mode
+        self.settings = make_settings(type(self).__name__, task, settings, ("task", "render_mode"))
         self._fleet = Fleet(task, self.settings, 1)
         self._renderer: Renderer | None = None
         self._started = False
         self.observation_space, self.action_space = single_spaces(self._fleet, self.settings)
-        self._shape = self.action_space.shape
+        self._shape = (self._fleet.body.actions,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode with the straight robot and a new scene and set-point.
 
+        A reset that raises changes nothing: neither the episode nor the generator.
+
         Args:
-            seed: Seeds the environment's generator.
+            seed: Seeds the environment's generator: a whole number from 0 on, or ``None`` to go on drawing.
             options: ``{"scene": Scene, "desired_force": float}`` fixes the assignment instead of drawing it [N]; the
                 force is a vector where the task asks for one.
 
         Raises:
-            ValueError: If the options are incomplete or out of range.
+            RuntimeError: If the task and the robot do not fit: no draw of many is feasible.
+            TypeError: If the options are no mapping, or the scene is no Scene.
+            ValueError: If the seed is no whole number from 0 on, or the options are incomplete or out of range.
         """
+        seed = check_seed("seed", seed)
+        given = _assignment(options, self.task)
+        generator = self._np_random, self._np_random_seed
         super().reset(seed=seed)
-        if options:
-            self._fleet.give(0, _assignment(options, self.task), self.np_random)
-        else:
-            self._fleet.draw([0], [self.np_random])
+        try:
+            if given is None:
+                self._fleet.draw([0], [self.np_random])
+            else:
+                self._fleet.give(0, given, self.np_random)
+        except BaseException:
+            self._np_random, self._np_random_seed = generator
+            raise
         self._started = True
         if self.render_mode == "human":
             self.render()
@@ -76,13 +98,10 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
-            ValueError: If the action has the wrong shape or is not finite; the state stays as it was.
+            ValueError: If the action is not finite real numbers of the right shape; the state stays as it was.
         """
-        if not self._started:
-            raise gymnasium.error.ResetNeeded("call reset() before step()")
-        pull = np.asarray(action)
-        if pull.shape != self._shape or not all(map(math.isfinite, pull.tolist())):
-            raise ValueError(f"action is {action!r}; it must be finite numbers of shape {self._shape}")
+        self._check_started("step")
+        pull = check_array("action", action, self._shape)
         fleet = self._fleet
         fleet.step(fleet.body.effort(pull), 0)
         reading = fleet.read(0)
@@ -112,17 +131,37 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
     @property
     def equilibrium(self) -> Any:
-        """The present equilibrium; immutable."""
+        """The present equilibrium; immutable.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+        """
+        self._check_started("equilibrium")
         return self._fleet.equilibrium(0)
 
     @property
     def truth(self) -> Truth:
-        """What no agent sees."""
+        """What no agent sees.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+        """
+        self._check_started("truth")
         return self._fleet.truth(0)
 
     def probe(self, places: np.ndarray) -> np.ndarray:
-        """Force on the robot that counts, ``(d,)`` [N], if what the actions move were elsewhere ``(actions,)`` [mm]."""
-        return np.asarray(self._fleet.probe(places[None])[0])
+        """Force on the robot that counts, ``(d,)`` [N], if what the actions move were elsewhere ``(actions,)`` [mm].
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+            ValueError: If the places are not finite real numbers of the right shape.
+        """
+        self._check_started("probe")
+        return np.asarray(self._fleet.probe(check_array("places", places, self._shape)[None])[0])
+
+    def _check_started(self, asked: str) -> None:
+        if not self._started:
+            raise gymnasium.error.ResetNeeded(f"call reset() before {asked}")
 
     def _observation(self, reading: Reading) -> Observation:
         row = self._fleet.observe(reading, 0)
@@ -137,14 +176,41 @@ def single_spaces(fleet: Fleet, settings: Settings) -> tuple[spaces.Space[Any], 
     )
 
 
-def _assignment(options: dict[str, Any], task: Task) -> Assignment:
-    require(
-        options.keys() == {"scene", "desired_force"},
-        f"options has {sorted(options)}; give both 'scene' and 'desired_force', or neither",
-    )
-    force = np.array(options["desired_force"], float)
-    shape = (task.body.model.space,) if task.force_vector else ()
-    require(force.shape == shape, f"desired_force is {force}; it must have the shape {shape}")
-    size = float(np.linalg.norm(force)) if shape else float(force)
-    require(0 < size <= FORCE_SCALE_N, f"desired_force is {force}; it must be positive and at most {FORCE_SCALE_N}")
-    return Assignment(options["scene"], force)
+def make_settings(name: str, task: Any, given: dict[str, Any], others: Sequence[str]) -> Settings:
+    """Settings of an environment from its keyword arguments.
+
+    Args:
+        name: What the environment is called.
+        task: Its task.
+        given: The keyword arguments.
+        others: Its arguments that are no settings, for the message about one of another name.
+
+    Raises:
+        TypeError: If there is no argument of that name, or one should be an object of another class.
+        ValueError: If one is out of range.
+    """
+    check_task(task)
+    kind = task.body.settings
+    check_names(name, given, [*others, *(declared.name for declared in fields(kind))])
+    settings: Settings = kind(**given)
+    return settings
+
+
+def _assignment(options: Any, task: Task) -> Assignment | None:
+    """The scene and the set-point of options, or ``None`` if there are none."""
+    wanted = "None, or a mapping of both 'scene' and 'desired_force'"
+    check_type("options", options, Mapping | None, wanted)
+    if not options:
+        return None
+    if set(options) != {"scene", "desired_force"}:
+        raise refusal("options", options, wanted)
+    scene = options["scene"]
+    check_type("scene", scene, Scene)
+    space = task.body.model.space
+    if any(obstacle.space != space for obstacle in scene):
+        kinds = ("of the plane", "in space")
+        raise refusal("scene", scene, "of obstacles {}, not {}".format(*kinds if space == 2 else kinds[::-1]))
+    shape = (space,) if task.force_vector else ()
+    force = check_array("desired_force", options["desired_force"], shape)
+    check_number("desired_force", math.hypot(*force) if shape else float(force), **SET_POINT)
+    return Assignment(scene, force)

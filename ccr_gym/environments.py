@@ -1,7 +1,9 @@
 """The registered environments."""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from ccr_gym.checks import check_instance
 from ccr_gym.describe import describe
 from ccr_gym.env import ContactEnv
 from ccr_gym.tasks import (
@@ -31,7 +33,7 @@ class TaskEnv(ContactEnv):
 
     kind: ClassVar[type[Task]]
 
-    def __init__(self, task: Task | dict[str, Any] | None = None, **kwargs: Any) -> None:
+    def __init__(self, task: Task | Mapping[str, Any] | None = None, **kwargs: Any) -> None:
         """See the class; `kwargs` are those of `ContactEnv`."""
         super().__init__(_of(self.kind, task), **kwargs)
 
@@ -41,7 +43,7 @@ class TaskVectorEnv(ContactVectorEnv):
 
     kind: ClassVar[type[Task]]
 
-    def __init__(self, task: Task | dict[str, Any] | None = None, **kwargs: Any) -> None:
+    def __init__(self, task: Task | Mapping[str, Any] | None = None, **kwargs: Any) -> None:
         """See the single environment; `kwargs` are those of `ContactVectorEnv`."""
         super().__init__(_of(self.kind, task), **kwargs)
 
@@ -189,6 +191,6 @@ class SpatialPushVectorEnv(TaskVectorEnv):
     kind = SpatialPush
 
 
-def _of(kind: type[Task], task: Task | dict[str, Any] | None) -> Task:
-    """A task, from one, a mapping of its fields, or nothing."""
-    return kind(**task) if isinstance(task, dict) else task or kind()
+def _of(kind: type[Task], task: Any) -> Any:
+    """A task, from one of any kind, a mapping of the fields of this kind, or nothing."""
+    return task if isinstance(task, Task) else check_instance("task", task, kind=kind, default=kind)

@@ -3,7 +3,8 @@
 Every environment, single or vector, is a shell around a fleet, so that they cannot drift apart.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,8 +15,9 @@ from ccr_gym.observation import AHEAD, Observer
 from ccr_gym.reward import TERMS, reward_terms
 from ccr_gym.sensing import Senses
 from ccr_gym.settings import Settings
-from ccr_gym.tasks import COURSE_STEPS, Assignment, Task, assign
-from solver.layout import SPACE
+from ccr_gym.tasks import COURSE_STEPS, Assignment, Task, assign, check_robot
+from solver.batch import BaseBatch
+from solver.layout import SPACE, Layout
 from solver.solve import Solver
 from solver.spatial import SpatialSolver
 
@@ -64,6 +66,22 @@ class Truth(NamedTuple):
     slack: np.ndarray
 
 
+class Room(NamedTuple):
+    """What depends on the number of obstacles of a scene.
+
+    Attributes:
+        solver: The robots.
+        layout: Where the numbers of an equilibrium stand.
+        observer: What is seen of it.
+        senses: What is not ideal, if anything is.
+    """
+
+    solver: BaseBatch
+    layout: Layout
+    observer: Observer
+    senses: Senses | None
+
+
 class Fleet:
     """Robots, each with a scene and a force to push with.
 
@@ -72,9 +90,13 @@ class Fleet:
         settings: What the environments were told.
         count: Number N of episodes.
         threads: Threads of the solver.
+
+    Raises:
+        ValueError: If an obstacle of the task could slip through the robot.
     """
 
     def __init__(self, task: Task, settings: Settings, count: int, threads: int = 1) -> None:
+        check_robot(task, settings.robot)
         self._task, self._settings, self.body = task, settings, task.body
         self._target, self._vector = task.target, task.force_vector
         self.count, self._threads = count, threads
@@ -84,20 +106,39 @@ class Fleet:
         self._effort = np.zeros(count) if self.body.actions == 1 else np.zeros((count, self.body.actions))
         self._seen = np.zeros((count, self.body.obstacle_size))
         self._time = np.zeros(count, int)  # steps of the episode
-        self._enter(task.obstacles)
+        self._trial = self.body.batch(settings, count, task.obstacles, threads)  # where scenes are tried out
+        self._enter(self._make_room(task.obstacles))
 
-    def _enter(self, obstacles: int) -> None:
+    def _make_room(self, obstacles: int) -> Room:
         """Make room for scenes of so many obstacles."""
-        self.solver = self.body.batch(self._settings, self.count, obstacles, self._threads)
-        self._layout = self.solver.layout
-        self.observer = Observer(self.body, self._settings, self._layout, self._task)
-        senses = self._settings.senses
-        self._senses = Senses(senses, self.count, self.body, self.observer.delayed) if senses else None
+        solver = self.body.batch(self._settings, self.count, obstacles, self._threads)
+        observer = Observer(self.body, self._settings, solver.layout, self._task)
+        ranges = self._settings.senses
+        senses = Senses(ranges, self.count, self.body, observer.delayed) if ranges else None
+        return Room(solver, solver.layout, observer, senses)
+
+    def _room_for(self, obstacles: int) -> Room:
+        """The present room, or another one where the number of obstacles is another."""
+        if obstacles == self._layout.obstacles:
+            return Room(self.solver, self._layout, self.observer, self._senses)
+        require(self.count == 1, f"all scenes of several robots must have {self._layout.obstacles} obstacles")
+        return self._make_room(obstacles)
+
+    def _enter(self, room: Room) -> None:
+        self.solver, self._layout, self.observer, self._senses = room
 
     def draw(self, robots: Sequence[int], generators: Sequence[np.random.Generator]) -> None:
-        """Start new episodes of some robots, each drawn by its own generator."""
+        """Start new episodes of some robots, each drawn by its own generator.
+
+        Raises:
+            RuntimeError: As :func:`ccr_gym.tasks.assign`; episodes and generators stay as they were.
+        """
         settings = self._settings
-        forces, drawn = assign(self._task, self.solver, robots, generators, settings.cable_limit_mm, settings.split)
+        with _restored_on_error(generators):
+            forces, drawn = assign(self._task, self._trial, robots, generators, settings.cable_limit_mm, settings.split)
+        self._enter(self._room_for(self._task.obstacles))
+        for robot, assignment in zip(robots, drawn, strict=True):
+            self.solver.assign(robot, assignment.scene)
         self._begin(robots, forces, drawn, generators)
 
     def give(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
@@ -110,10 +151,9 @@ class Fleet:
         solver(self._settings.robot, assignment.scene)
         least = 1 if self._target is None else self._target + 1
         require(len(assignment.scene) >= least, f"the scene has {len(assignment.scene)} obstacles; it needs {least}")
-        if len(assignment.scene) != self._layout.obstacles:
-            require(self.count == 1, f"all scenes of several robots must have {self._layout.obstacles} obstacles")
-            self._enter(len(assignment.scene))
-        self.solver.assign(robot, assignment.scene)
+        room = self._room_for(len(assignment.scene))
+        room.solver.assign(robot, assignment.scene)
+        self._enter(room)
         self._begin([robot], np.atleast_2d(assignment.desired_force), [assignment], [generator])
 
     def _begin(
@@ -255,6 +295,18 @@ class Fleet:
     def equilibrium(self, robot: int) -> Any:
         """A robot's present equilibrium; immutable."""
         return self.solver.equilibrium(robot)
+
+
+@contextmanager
+def _restored_on_error(generators: Sequence[np.random.Generator]) -> Iterator[None]:
+    """Put generators back to where they were after any exception."""
+    states = [generator.bit_generator.state for generator in generators]
+    try:
+        yield
+    except BaseException:
+        for generator, state in zip(generators, states, strict=True):
+            generator.bit_generator.state = state
+        raise
 
 
 def _norm(forces: np.ndarray) -> Any:

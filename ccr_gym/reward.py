@@ -5,7 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from ccr_gym.checks import check_fields, check_number, checked
 from solver.operations import Operations
+
+MAX_WEIGHT = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,13 +21,19 @@ class RewardWeights:
         overshoot: Relative force above the set-point, counted up to 1.
         approach: Clearance per 100 mm while nothing touches.
         effort: Squared action.
+
+    Raises:
+        ValueError: If a weight is no number, negative, or beyond 1e6.
     """
 
-    force_error: float = 1.0
-    accuracy: float = 1.0
-    overshoot: float = 0.5
-    approach: float = 1.0
-    effort: float = 0.02
+    force_error: float = checked(1.0, check_number, low=0, high=MAX_WEIGHT)
+    accuracy: float = checked(1.0, check_number, low=0, high=MAX_WEIGHT)
+    overshoot: float = checked(0.5, check_number, low=0, high=MAX_WEIGHT)
+    approach: float = checked(1.0, check_number, low=0, high=MAX_WEIGHT)
+    effort: float = checked(0.02, check_number, low=0, high=MAX_WEIGHT)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 TERMS = tuple(field.name for field in fields(RewardWeights))

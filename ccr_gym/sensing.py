@@ -4,12 +4,12 @@ Every episode has its own, drawn by its environment's generator when it begins, 
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ccr_gym.checks import require
+from ccr_gym.checks import SMALLEST, check_fields, check_range, checked
 
 if TYPE_CHECKING:
     from ccr_gym.bodies import Body
@@ -33,27 +33,18 @@ class Sensing:
         stiffness: Rigidity of the robot over the one that is known; forces grow with it, shapes do not change.
 
     Raises:
-        ValueError: If a range does not grow, or goes beyond what is possible; the message names the bound.
+        ValueError: If a range is not two numbers, descends, or goes beyond what is possible.
     """
 
-    latency: tuple[int, ...] = (1, 4)
-    noise_n: Range = (0.0005, 0.0015)
-    bias_n: Range = (0.0, 0.003)
-    backlash_mm: Range = (0.2, 0.6)
-    friction: Range = (0.0, 0.3)
-    stiffness: Range = (0.3, 3.0)
+    latency: tuple[int, ...] = checked((1, 4), check_range, whole=True, low=0, high=HISTORY - 1)
+    noise_n: Range = checked((0.0005, 0.0015), check_range, low=0)
+    bias_n: Range = checked((0.0, 0.003), check_range, low=0)
+    backlash_mm: Range = checked((0.2, 0.6), check_range, low=0)
+    friction: Range = checked((0.0, 0.3), check_range, low=0, high=0.9)
+    stiffness: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
 
     def __post_init__(self) -> None:
-        bounds = {"latency": HISTORY - 1, "friction": 0.9}
-        for field in fields(self):
-            low, high = getattr(self, field.name)
-            object.__setattr__(self, field.name, (low, high))
-            bound = bounds.get(field.name, np.inf)
-            require(0 <= low <= high <= bound, f"{field.name} is {(low, high)}; it must grow within 0 to {bound:.6g}")
-        require(self.stiffness[0] > 0, f"stiffness is {self.stiffness}; it must be positive")
-        require(
-            all(isinstance(steps, int) for steps in self.latency), f"latency is {self.latency}; it must be whole steps"
-        )
+        check_fields(self)
 
 
 class Senses:

@@ -1,13 +1,42 @@
 """What an environment is told when it is made, checked once."""
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
 
-from ccr_gym.checks import require
+from ccr_gym.checks import (
+    SMALLEST,
+    check_choice,
+    check_fields,
+    check_flag,
+    check_instance,
+    check_number,
+    checked,
+    nested,
+    refusal,
+    require,
+)
 from ccr_gym.reward import RewardWeights
 from ccr_gym.sensing import Sensing
 from solver import Robot
 from solver.spatial import SpatialRobot
+
+MAX_FRICTION = 10.0
+
+
+def check_sensing(name: str, value: Any) -> Any:
+    """Return ``"ideal"``, ``"realistic"`` or a :class:`Sensing`, which may come as a mapping of its fields.
+
+    Raises:
+        TypeError: If it is anything else.
+        ValueError: If it is another word, or as :class:`Sensing`.
+    """
+    if isinstance(value, str) and value in ("ideal", "realistic"):
+        return value
+    if not isinstance(value, Sensing | Mapping):
+        kind = ValueError if isinstance(value, str) else TypeError
+        raise refusal(name, value, "'ideal', 'realistic' or the fields of a Sensing", kind)
+    return check_instance(name, value, kind=Sensing)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +49,7 @@ class Settings:
         force_sensor: Whether the exact contact force is observed beside the virtual-work estimate.
         max_increment_mm: Cable increment of a full action [mm].
         cable_limit_mm: Largest cable displacement a policy can command [mm].
-        friction: Ratio μ of the virtual-work estimator (eq. 11).
+        friction: Ratio μ of the virtual-work estimator (eq. 11), from 0 to 10.
         force_limit: Contact force above which ``info["cost"]`` counts [N].
         weights: Weights of the reward terms; a mapping of names to numbers is taken as well.
         backend: ``"native"``, or ``"casadi"`` for the reference solver (slow).
@@ -29,46 +58,34 @@ class Settings:
         split: Which scenes are drawn: ``"train"``, ``"test"``, which no training scene is in, or ``"all"``.
 
     Raises:
+        TypeError: If an argument should be an object of another class.
         ValueError: If an argument is out of range; the message names the bound.
     """
 
-    kind: ClassVar[type[Any]] = Robot  # of the robot
-
-    robot: Any = field(default_factory=Robot.prototype)
-    obs_mode: Literal["dict", "flat"] = "dict"
-    force_sensor: bool = True
-    max_increment_mm: float = 0.5
-    cable_limit_mm: float = 14.0
-    friction: float = 0.0
-    force_limit: float = 0.3
-    weights: RewardWeights = field(default_factory=RewardWeights)
-    backend: Literal["native", "casadi"] = "native"
-    sensing: Any = "ideal"
-    split: Literal["all", "train", "test"] = "all"
+    robot: Any = nested(Robot, Robot.prototype)
+    obs_mode: Literal["dict", "flat"] = checked("dict", check_choice, choices=("dict", "flat"))
+    force_sensor: bool = checked(True, check_flag)
+    max_increment_mm: float = checked(0.5, check_number, low=SMALLEST)
+    cable_limit_mm: float = checked(14.0, check_number, low=SMALLEST)
+    friction: float = checked(0.0, check_number, low=0, high=MAX_FRICTION)
+    force_limit: float = checked(0.3, check_number, low=SMALLEST)
+    weights: RewardWeights = nested(RewardWeights)
+    backend: Literal["native", "casadi"] = checked("native", check_choice, choices=("native", "casadi"))
+    sensing: Any = checked("ideal", check_sensing)
+    split: Literal["all", "train", "test"] = checked("all", check_choice, choices=("all", "train", "test"))
 
     def __post_init__(self) -> None:
-        if isinstance(self.sensing, dict):
-            object.__setattr__(self, "sensing", Sensing(**self.sensing))
-        known = isinstance(self.sensing, Sensing) or self.sensing in ("ideal", "realistic")
-        require(known, f"sensing is {self.sensing!r}; it must be 'ideal', 'realistic' or the fields of a Sensing")
-        require(self.split in ("all", "train", "test"), f"split is {self.split!r}; it must be 'all', 'train' or 'test'")
-        given: Any = self.robot
-        if given is None or isinstance(given, dict):
-            object.__setattr__(self, "robot", self.kind(**given) if given else self.kind.prototype())
-        given = self.weights
-        if given is None or isinstance(given, dict):
-            object.__setattr__(self, "weights", RewardWeights(**(given or {})))
-        require(self.obs_mode in ("dict", "flat"), f"obs_mode is {self.obs_mode!r}; it must be 'dict' or 'flat'")
-        require(self.backend in ("native", "casadi"), f"backend is {self.backend!r}; it must be 'native' or 'casadi'")
+        check_fields(self)
         require(
-            0 < self.cable_limit_mm <= self.robot.cable_limit_mm,
-            f"cable_limit_mm is {self.cable_limit_mm}; it must be positive and at most {self.robot.cable_limit_mm:.6g}",
+            self.cable_limit_mm <= self.robot.cable_limit_mm,
+            f"cable_limit_mm is {self.cable_limit_mm}; it must be at most {self.robot.cable_limit_mm:.6g}, "
+            "the max_cable_mm of the robot",
         )
         require(
-            0 < self.max_increment_mm <= self.cable_limit_mm,
-            f"max_increment_mm is {self.max_increment_mm}; it must be positive and at most cable_limit_mm",
+            self.max_increment_mm <= self.cable_limit_mm,
+            f"max_increment_mm is {self.max_increment_mm}; it must be at most {self.cable_limit_mm:.6g}, "
+            "the cable_limit_mm",
         )
-        require(self.force_limit > 0, f"force_limit is {self.force_limit}; it must be positive")
 
     @property
     def senses(self) -> Sensing | None:
@@ -91,13 +108,12 @@ class InsertionSettings(Settings):
         max_insertion_mm: Insertion of a full action [mm].
     """
 
-    robot: Any = field(default_factory=_insertable)
-    max_insertion_mm: float = 1.0
+    robot: Any = nested(Robot, _insertable)
+    max_insertion_mm: float = checked(1.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
         Settings.__post_init__(self)
         require(self.robot.length_range_mm is not None, "robot has no length_range_mm; give the lengths of insertion")
-        require(self.max_insertion_mm > 0, f"max_insertion_mm is {self.max_insertion_mm}; it must be positive")
         require(self.backend == "native", f"backend is {self.backend!r}; with insertion it must be 'native'")
 
 
@@ -112,10 +128,8 @@ class SpatialSettings(Settings):
         backend: ``"native"``; the reference solver tells too little in space.
     """
 
-    kind: ClassVar[type[Any]] = SpatialRobot
-
-    robot: Any = field(default_factory=SpatialRobot.prototype)
-    cable_limit_mm: float = 10.0
+    robot: Any = nested(SpatialRobot, SpatialRobot.prototype)
+    cable_limit_mm: float = checked(10.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
         Settings.__post_init__(self)

@@ -10,8 +10,24 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ccr_gym.bodies import IN_PLANE, IN_SPACE, INSERTED, Body
+from ccr_gym.checks import (
+    SMALLEST,
+    check_array,
+    check_fields,
+    check_flag,
+    check_number,
+    check_range,
+    check_ranges,
+    check_type,
+    check_whole,
+    checked,
+    refusal,
+)
+from ccr_gym.observation import FORCE_SCALE_N
 from solver import Circle, HalfPlane, Robot, Scene
 from solver.batch import BaseBatch
+from solver.scene import MAX_OBSTACLES
+from solver.solve import check_width
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
 MAX_DRAWS = 1000
@@ -19,6 +35,8 @@ HALF_CYLINDER_MM = 30.0
 COURSE_STEPS = 128  # of a set-point that moves
 TEST_SHARE = 5  # one scene in so many is a test scene
 PROBE_MM = 0.5  # cable displacement between the equilibria of a trial pull
+SET_POINT = {"low": 1e-6 * FORCE_SCALE_N, "high": FORCE_SCALE_N, "reason": "what the observation can show, in N"}
+CIRCLE: tuple[dict[str, float], ...] = ({}, {}, {"low": SMALLEST})  # bounds of x, y and radius
 
 
 class Assignment(NamedTuple):
@@ -40,6 +58,8 @@ class Assignment(NamedTuple):
 class Task(ABC):
     """A distribution over assignments.
 
+    A dataclass of this kind checks the fields that it declares with :func:`ccr_gym.checks.checked`.
+
     Attributes:
         body: The model of its robots.
         obstacles: Number of obstacles of every scene.
@@ -55,6 +75,9 @@ class Task(ABC):
     moving: ClassVar[bool] = False
     steps: ClassVar[int] = 64
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     @property
     def force_vector(self) -> bool:
         """As above."""
@@ -63,6 +86,10 @@ class Task(ABC):
     @abstractmethod
     def draw(self, robot: Any, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
+
+    def narrowest(self) -> Sequence[Scene]:
+        """Scenes of the narrowest obstacles there can be, which must not fit between the points of the robot."""
+        return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +102,9 @@ class LoadCell(Task):
         force_n: Range of the desired force [N].
     """
 
-    distance_mm: tuple[float, float] = (24.0, 51.0)
-    height_mm: float = 127.0
-    force_n: tuple[float, float] = (0.01, 0.06)
+    distance_mm: tuple[float, float] = checked((24.0, 51.0), check_range, low=SMALLEST)
+    height_mm: float = checked(127.0, check_number)
+    force_n: tuple[float, float] = checked((0.01, 0.06), check_range, **SET_POINT)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
@@ -98,15 +125,19 @@ class PushObstacle(Task):
         force_n: Range of the desired force [N].
     """
 
-    x_mm: tuple[float, float] = (35.0, 75.0)
-    y_mm: tuple[float, float] = (75.0, 150.0)
-    radius_mm: tuple[float, float] = (10.0, 16.0)
-    force_n: tuple[float, float] = (0.02, 0.15)
+    x_mm: tuple[float, float] = checked((35.0, 75.0), check_range)
+    y_mm: tuple[float, float] = checked((75.0, 150.0), check_range)
+    radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, low=SMALLEST)
+    force_n: tuple[float, float] = checked((0.02, 0.15), check_range, **SET_POINT)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
         x, y, radius, force = uniform(generator, self.x_mm, self.y_mm, self.radius_mm, self.force_n)
         return Assignment(Scene([Circle(center=(x, y), radius=radius)]), force)
+
+    def narrowest(self) -> Sequence[Scene]:
+        """The smallest circle."""
+        return (Scene([_circle(self.x_mm, self.y_mm, self.radius_mm)]),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,17 +145,17 @@ class TrackForce(PushObstacle):
     """The same with a set-point that steps and swings, and is seen some steps ahead.
 
     Attributes:
-        jumps: Number of jumps of the set-point in an episode.
-        swing: Range of its swing's amplitude, over its level.
-        period: Range of the swing's period [steps].
+        jumps: Number of jumps of the set-point in an episode, at most one a step.
+        swing: Range of its swing's amplitude, over its level; below 1, so that the set-point stays positive.
+        period: Range of the swing's period, from a step on [steps].
     """
 
     moving: ClassVar[bool] = True
     steps: ClassVar[int] = COURSE_STEPS
 
-    jumps: int = 3
-    swing: tuple[float, float] = (0.1, 0.4)
-    period: tuple[float, float] = (24.0, 64.0)
+    jumps: int = checked(3, check_whole, low=0, high=COURSE_STEPS)
+    swing: tuple[float, float] = checked((0.1, 0.4), check_range, low=0, below=1)
+    period: tuple[float, float] = checked((24.0, 64.0), check_range, low=1)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene, the highest force, and the way to it."""
@@ -150,9 +181,13 @@ class BracedPush(Task):
     obstacles: ClassVar[int] = 2
     target: ClassVar[int | None] = 1
 
-    brace_mm: tuple[tuple[float, float], ...] = ((27.0, 38.0), (75.0, 95.0), (10.0, 14.0))
-    goal_mm: tuple[tuple[float, float], ...] = ((52.0, 72.0), (125.0, 150.0), (12.0, 16.0))
-    force_n: tuple[float, float] = (0.02, 0.12)
+    brace_mm: tuple[tuple[float, float], ...] = checked(
+        ((27.0, 38.0), (75.0, 95.0), (10.0, 14.0)), check_ranges, bounds=CIRCLE
+    )
+    goal_mm: tuple[tuple[float, float], ...] = checked(
+        ((52.0, 72.0), (125.0, 150.0), (12.0, 16.0)), check_ranges, bounds=CIRCLE
+    )
+    force_n: tuple[float, float] = checked((0.02, 0.12), check_range, **SET_POINT)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
@@ -161,6 +196,10 @@ class BracedPush(Task):
         )
         goal = Circle(center=(goal_x, goal_y), radius=goal_radius)
         return Assignment(Scene([Circle(center=(x, y), radius=radius), goal]), force)
+
+    def narrowest(self) -> Sequence[Scene]:
+        """The smallest circles."""
+        return (Scene([_circle(*self.brace_mm), _circle(*self.goal_mm)]),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +210,7 @@ class SoftObstacle(PushObstacle):
         stiffness: Range of the spring's stiffness, drawn evenly in its logarithm [N/mm].
     """
 
-    stiffness: tuple[float, float] = (0.003, 0.1)
+    stiffness: tuple[float, float] = checked((0.003, 0.1), check_range, low=SMALLEST)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
@@ -186,7 +225,7 @@ class InsertAndPush(PushObstacle):
 
     body: ClassVar[Body] = INSERTED
 
-    y_mm: tuple[float, float] = (75.0, 130.0)
+    y_mm: tuple[float, float] = checked((75.0, 130.0), check_range)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,23 +237,23 @@ class SpatialPush(Task):
         height_mm: Range of its centre's height above the base [mm].
         radius_mm: Range of its radius [mm].
         cylinders: Share of cylinders, which are 60 mm long and lie across the way of the robot.
-        tilt: Largest angle of a cylinder's axis from the horizontal [rad].
+        tilt: Largest angle of a cylinder's axis from the horizontal, at most a quarter turn [rad].
         force_n: Range of the desired force [N].
         force_vector: Whether a force is asked for in magnitude and direction, instead of the magnitude alone.
         aside: Largest angle between the obstacle's direction and that of the pull whose force is asked for, with
-            ``force_vector`` [rad].
+            ``force_vector``, at most a quarter turn [rad].
     """
 
     body: ClassVar[Body] = IN_SPACE
 
-    distance_mm: tuple[float, float] = (35.0, 65.0)
-    height_mm: tuple[float, float] = (80.0, 150.0)
-    radius_mm: tuple[float, float] = (10.0, 16.0)
-    cylinders: float = 0.5
-    tilt: float = math.pi / 6
-    force_n: tuple[float, float] = (0.02, 0.15)
-    force_vector: bool = False
-    aside: float = 0.25
+    distance_mm: tuple[float, float] = checked((35.0, 65.0), check_range, low=0)
+    height_mm: tuple[float, float] = checked((80.0, 150.0), check_range)
+    radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, low=SMALLEST)
+    cylinders: float = checked(0.5, check_number, low=0, high=1)
+    tilt: float = checked(math.pi / 6, check_number, low=0, high=math.pi / 2)
+    force_n: tuple[float, float] = checked((0.02, 0.15), check_range, **SET_POINT)
+    force_vector: bool = checked(False, check_flag)
+    aside: float = checked(0.25, check_number, low=0, high=math.pi / 2)
 
     def draw(self, robot: SpatialRobot, generator: np.random.Generator) -> Assignment:
         """A scene, a desired force, and a pull towards the obstacle."""
@@ -226,12 +265,57 @@ class SpatialPush(Task):
         center = distance * outward + [0.0, 0.0, height]
         half = HALF_CYLINDER_MM * np.array([-math.cos(tilt) * outward[1], math.cos(tilt) * outward[0], math.sin(tilt)])
         if kind < self.cylinders:
-            start, end = (tuple((center + side * half).tolist()) for side in (-1, 1))
-            scene = Scene([Cylinder(start=start, end=end, radius=radius, edge=2.0)])
+            scene = Scene([_cylinder(center, half, radius)])
         else:
             scene = Scene([Sphere(center=tuple(center.tolist()), radius=radius)])
         towards = azimuth + aside if self.force_vector else azimuth
         return Assignment(scene, force, (math.cos(towards), math.cos(towards - robot.angle)))
+
+    def narrowest(self) -> Sequence[Scene]:
+        """The smallest sphere and the smallest cylinder, of those there are."""
+        center = np.array([self.distance_mm[0], 0.0, self.height_mm[0]])
+        across, radius = np.array([0.0, HALF_CYLINDER_MM, 0.0]), self.radius_mm[0]
+        spheres = [Sphere(center=tuple(center.tolist()), radius=radius)] if self.cylinders < 1 else []
+        cylinders = [_cylinder(center, across, radius)] if self.cylinders > 0 else []
+        return [Scene([obstacle]) for obstacle in (*spheres, *cylinders)]
+
+
+def _circle(x_mm: tuple[float, float], y_mm: tuple[float, float], radius_mm: tuple[float, float]) -> Circle:
+    """The smallest circle of some ranges."""
+    return Circle(center=(x_mm[0], y_mm[0]), radius=radius_mm[0])
+
+
+def _cylinder(center: np.ndarray, half: np.ndarray, radius: float) -> Cylinder:
+    """A cylinder about a centre, to half its axis either way."""
+    start, end = (tuple((center + side * half).tolist()) for side in (-1, 1))
+    return Cylinder(start=start, end=end, radius=radius, edge=2.0)
+
+
+def check_task(task: Any) -> None:
+    """Refuse what is no task, or one whose obstacles, target or steps make no sense.
+
+    Raises:
+        TypeError: If it is no task.
+        ValueError: If one of them is no whole number, or out of range.
+    """
+    check_type("task", task, Task)
+    check_whole("obstacles of the task", task.obstacles, low=1, high=MAX_OBSTACLES)
+    check_whole("steps of the task", task.steps, low=1)
+    if task.target is not None:
+        check_whole("target of the task", task.target, low=0, high=task.obstacles - 1)
+
+
+def check_robot(task: Task, robot: Any) -> None:
+    """Refuse a robot that some obstacle of a task could slip through, and a task whose narrowest obstacles are none.
+
+    Raises:
+        ValueError: Naming the task, the obstacle, its width and what the robot needs.
+    """
+    try:
+        for scene in task.narrowest():
+            check_width(robot, scene)
+    except ValueError as error:
+        raise ValueError(f"the narrowest obstacles of {task} cannot be: {error}") from error
 
 
 def uniform(generator: np.random.Generator, *ranges: tuple[float, float]) -> list[float]:
@@ -256,7 +340,7 @@ def assign(
 
     Args:
         task: Where scenes and forces are drawn from.
-        solver: The robots; those named are assigned to their scenes.
+        solver: Robots to try scenes with; those named are assigned to theirs.
         robots: Which.
         generators: One for each of them.
         cable_limit_mm: Largest cable displacement that may be needed [mm].
@@ -267,6 +351,8 @@ def assign(
 
     Raises:
         RuntimeError: If no draw of many is feasible: the task and the robot do not fit.
+        TypeError: If the task draws something else than an :class:`Assignment`.
+        ValueError: If it draws a scene or a set-point that it must not.
     """
     desired = np.zeros((len(robots), solver.model.space if task.force_vector else 1))
     assignments: list[Any] = [None] * len(robots)
@@ -280,6 +366,8 @@ def assign(
         forces = np.array([assignment.desired_force for assignment in drawn], float)
         pulls = np.array([assignment.pull for assignment in drawn])
         found, reached = solver.reaches(names, forces, PROBE_MM, cable_limit_mm, pulls, task.target)
+        if task.force_vector:
+            found &= np.linalg.norm(reached, axis=1) <= FORCE_SCALE_N
         desired[waiting] = reached if task.force_vector else forces[:, None]
         waiting = [k for k, success in zip(waiting, found, strict=True) if not success]
         if not waiting:
@@ -297,7 +385,22 @@ def in_test_split(scene: Scene) -> bool:
 
 def _draw(task: Task, robot: Any, generator: np.random.Generator, split: str) -> Assignment:
     """The next assignment of a split."""
-    while True:
+    for _ in range(MAX_DRAWS):
         drawn = task.draw(robot, generator)
+        _check_drawn(task, drawn)
         if split == "all" or in_test_split(drawn.scene) == (split == "test"):
             return drawn
+    raise RuntimeError(f"none of {MAX_DRAWS} draws of {task} is a {split} scene; widen the task's ranges")
+
+
+def _check_drawn(task: Task, drawn: Any) -> None:
+    check_type("what the task draws", drawn, Assignment, "an Assignment")
+    check_type("scene of a draw", drawn.scene, Scene)
+    if len(drawn.scene) != task.obstacles:
+        raise refusal("scene of a draw", drawn.scene, f"a Scene of {task.obstacles} obstacles, as the task declares")
+    check_number("desired_force of a draw", drawn.desired_force, **SET_POINT)
+    check_array("pull of a draw", drawn.pull, (task.body.model.cables,))
+    if drawn.course is not None:
+        course = check_array("course of a draw", drawn.course, (COURSE_STEPS,))
+        if not ((course > 0).all() and (course <= 1).all()):
+            raise refusal("course of a draw", drawn.course, "above 0 and at most 1 at every step")

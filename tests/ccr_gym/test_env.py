@@ -177,7 +177,7 @@ def test_arguments_are_json_able():
 
 
 def test_an_impossible_task_says_so():
-    env = make("CCR/LoadCell-v0", task={"force_n": [50.0, 60.0]})
+    env = make("CCR/LoadCell-v0", task={"force_n": [0.1, 0.2], "distance_mm": [170.0, 179.0]})
     with pytest.raises(RuntimeError, match="widen"):
         env.reset(seed=0)
 

@@ -133,7 +133,7 @@ def test_training_and_test_scenes_have_none_in_common(env_id):
     [
         ({"sensing": "perfect"}, "sensing is 'perfect'"),
         ({"sensing": {"latency": [1, 9]}}, "latency is"),
-        ({"sensing": {"latency": [0.5, 1.5]}}, "whole steps"),
+        ({"sensing": {"latency": [0.5, 1.5]}}, "whole numbers"),
         ({"sensing": {"noise_n": [0.2, 0.1]}}, "noise_n is"),
         ({"sensing": {"stiffness": [0.0, 1.0]}}, "stiffness is"),
         ({"split": "validation"}, "split is"),

@@ -67,7 +67,7 @@ def test_a_vector_can_be_asked_for():
     scene = env.unwrapped.equilibrium.scene
     observation, info = env.reset(options={"scene": scene, "desired_force": (x, y, z)})
     assert info["desired_force"] == pytest.approx(goal)
-    with pytest.raises(ValueError, match="must have the shape"):
+    with pytest.raises(ValueError, match="of shape"):
         env.reset(options={"scene": scene, "desired_force": 0.1})
 
 

@@ -92,7 +92,7 @@ def test_without_a_seed_episodes_differ_and_go_on():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"options": {"scene": 1}}, "options has"),
+        ({"options": {"scene": 1}}, "options is"),
         ({"options": {"reset_mask": np.ones(2, bool)}}, "reset_mask is"),
         ({"options": {"reset_mask": np.zeros(3, bool)}}, "reset_mask is"),
         ({"seed": [1, 2]}, "seed has 2 entries; it must have 3"),
