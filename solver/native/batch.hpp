@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -36,7 +37,7 @@ class Batch {
         }
     };
     if (workers_.size() == 1 || count <= kAlone) return run(0);
-    pool_.run(run);
+    pool_.run(std::ref(run));  // a function that holds it would be allocated
   }
 
  private:
