@@ -20,7 +20,7 @@ struct Work {
 
   // Cables that pull more with each step, towards a place in space.
   std::array<double, D> towards(Random& random, const Position<D>& place, int step) const {
-    const double pull = 1.5 * robot.offset * step / kSteps * random.uniform(0.9, 1.1);
+    const double pull = 1.1 * robot.offset * step / kSteps * random.uniform(0.9, 1.1);
     if constexpr (D == 2) return {pull, length};
     const double away = std::hypot(place[0], place[1]);
     std::array<double, D> command{};
