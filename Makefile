@@ -3,7 +3,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test bench instructions soak lint clean
+.PHONY: demo test lint native sanitize bench instructions soak clean
+
+NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
+BUILD = $(BIN)/cmake --build
+CHECK = $(BIN)/ctest --output-on-failure --test-dir
+SEED ?= 1
+FUZZ ?= 60
 
 demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controllers, write figures and videos to runs/demo
 	$(BIN)/ccr-gym train --run runs/demo
@@ -16,6 +22,20 @@ lint: $(INSTALL)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+native: $(INSTALL)  ## tests of the kernel in C++ (needs doctest: apt-get install doctest-dev)
+	$(NATIVE) build/native
+	$(BUILD) build/native --parallel
+	$(CHECK) build/native
+
+sanitize: $(INSTALL)  ## the same under ASan and UBSan, FUZZ seconds of random scenes from a SEED on, and the batch under TSan
+	$(NATIVE) build/address -DCCR_SANITIZE=address,undefined
+	$(BUILD) build/address --parallel
+	$(CHECK) build/address
+	build/address/fuzz $(SEED) $(FUZZ)
+	$(NATIVE) build/thread -DCCR_SANITIZE=thread
+	$(BUILD) build/thread --parallel --target batch_tests
+	build/thread/batch_tests
 
 bench: $(INSTALL)
 	$(BIN)/ccr-gym bench

@@ -1,39 +1,59 @@
-"""Instructions of the kernel on fixed replays of the contact mix, counted by valgrind: they do not depend on the load.
+"""Count the instructions of the kernel on fixed replays of the contact mixes, which do not depend on the load.
 
-``python benchmarks/instructions.py`` compares with ``instructions.json``; ``--update`` writes it anew.
+Needs valgrind. ``python benchmarks/instructions.py`` compares with ``instructions.json``; ``--update`` writes it anew.
 """
 
 import argparse
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
-from agents.bench.kernel import Timed, contact_mix
+from agents.bench import space
+from agents.bench.kernel import PlanarStep, contact_mix
 from solver import Robot
+from solver.obstacles import SHAPES
 
 HERE = Path(__file__).parent
-NATIVE, RECORDED = HERE.parent / "solver" / "native", HERE / "instructions.json"
-MATH = ["-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=off"]
-FLAGS = ["-std=c++20", "-O3", *MATH, "-Wno-psabi"]
+RECORDED = HERE / "instructions.json"
 STEPS = 2000
 
 
-def write(steps: list[Timed], path: Path) -> None:
+def planar(cable: str) -> list[PlanarStep]:
+    """The contact mix of the plane with one kind of cable."""
+    return list(contact_mix(STEPS, robot=replace(Robot.prototype(), cable=cable)))
+
+
+Steps = Sequence[PlanarStep | space.SpatialStep]
+MIXES: dict[str, Callable[[], Steps]] = {
+    "uniform": lambda: planar("uniform"),
+    "sliding": lambda: planar("sliding"),
+    "space": lambda: list(space.contact_mix(STEPS)),
+}
+
+
+def write(steps: Steps, path: Path) -> None:
     """The recording that replay.cpp reads: numbers all, counts among them."""
     robot = steps[0].solver.robot
-    numbers = [robot.cable == "sliding", robot.segments, robot.offset_mm, robot.rigidity, robot.max_tension]
+    in_space = not isinstance(robot, Robot)
+    sliding = not in_space and robot.cable == "sliding"
+    numbers = [robot.length_mm, robot.offset_mm, robot.rigidity, robot.max_tension]
     groups = [(solver, list(group)) for solver, group in groupby(steps, key=lambda step: step.solver)]
-    parts: list[object] = [*numbers, robot.length_mm, len(groups)]
+    parts: list[object] = [3 if in_space else 2, sliding, robot.segments, *numbers, len(groups)]
     for solver, group in groups:
-        parts += [len(solver.scene), *(o.parameters for o in solver.scene), len(group)]
+        parts.append(len(solver.scene))
+        for obstacle in solver.scene:
+            parts += [SHAPES[obstacle.kind], len(obstacle.parameters), obstacle.parameters]
+        parts.append(len(group))
         for step in group:
             parts += [step.command, step.start.length_mm, step.start.block]
     np.concatenate([np.ravel(part) for part in parts]).astype(np.float64).tofile(path)
@@ -41,15 +61,14 @@ def write(steps: list[Timed], path: Path) -> None:
 
 def build(folder: Path) -> Path:
     """The replay, compiled as the kernel is."""
-    laws, program = folder / "laws", folder / "replay"
-    laws.mkdir()
-    subprocess.run([sys.executable, NATIVE.parent / "codegen.py", laws], check=True)
-    sources = [
-        HERE / "replay.cpp",
-        *(path for path in NATIVE.glob("*.cpp") if path.stem not in ("binding", "segment_wide")),
-    ]
-    subprocess.run(["c++", *FLAGS, f"-I{NATIVE}", f"-I{laws}", *sources, "-o", program], check=True)
-    return program
+    places = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    cmake = shutil.which("cmake", path=places)
+    if cmake is None:
+        raise SystemExit("cmake is not there; install it (pip install cmake) to build the replay")
+    configure = [cmake, "-S", HERE, "-B", folder, f"-DPython_EXECUTABLE={sys.executable}"]
+    for command in (configure, [cmake, "--build", folder, "--parallel"]):
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return folder / "replay"
 
 
 def count(program: Path, recording: Path) -> float:
@@ -69,17 +88,17 @@ def main() -> None:
     if not shutil.which("valgrind"):
         raise SystemExit("valgrind is not there; install it to count instructions")
     found = {}
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        program = build(folder)
-        for cable in ("uniform", "sliding"):
-            write(list(contact_mix(STEPS, robot=replace(Robot.prototype(), cable=cable))), folder / cable)
-            found[cable] = round(count(program, folder / cable))
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        program = build(folder / "build")
+        for name, mix in MIXES.items():
+            write(mix(), folder / name)
+            found[name] = round(count(program, folder / name))
     before = json.loads(RECORDED.read_text()) if RECORDED.exists() else {}
-    for cable, instructions in found.items():
-        recorded = before.get(cable)
+    for name, instructions in found.items():
+        recorded = before.get(name)
         change = f", {instructions / recorded - 1:+.1%} against {recorded:,} recorded" if recorded else ""
-        print(f"{cable} cable: {instructions:,} instructions a step, reading the recording included{change}")
+        print(f"{name}: {instructions:,} instructions a step, reading the recording included{change}")
     if arguments.update:
         RECORDED.write_text(json.dumps(found, indent=2) + "\n")
 

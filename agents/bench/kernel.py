@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from timeit import timeit
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -26,15 +26,23 @@ LARGEST_CABLE = 14.0  # [mm]
 DRIFT = 0.14  # mean cable increment, towards pulling [mm]
 
 
-@dataclass(frozen=True, slots=True)
-class Timed:
-    """One step of the mix: where it started, what was commanded, how it ended, and its time [µs]."""
+SolverT = TypeVar("SolverT")
+EquilibriumT = TypeVar("EquilibriumT")
+CommandT = TypeVar("CommandT")
 
-    solver: Solver
-    start: Equilibrium
-    command: float
-    end: Equilibrium
+
+@dataclass(frozen=True, slots=True)
+class Timed(Generic[SolverT, EquilibriumT, CommandT]):
+    """One step of a mix: where it started, what was commanded, how it ended, and its time [µs]."""
+
+    solver: SolverT
+    start: EquilibriumT
+    command: CommandT
+    end: EquilibriumT
     microseconds: float
+
+
+PlanarStep = Timed[Solver, Equilibrium, float]
 
 
 def random_scene(generator: np.random.Generator, robot: Robot, count: int | None = None) -> Scene:
@@ -48,7 +56,7 @@ def random_scene(generator: np.random.Generator, robot: Robot, count: int | None
             return Scene(circles)
 
 
-def timed_step(solver: Solver, start: Equilibrium, command: float) -> Timed:
+def timed_step(solver: Solver, start: Equilibrium, command: float) -> PlanarStep:
     """Step, with the time of the compiled call alone."""
     block = np.empty_like(start.block)
     begin = time.perf_counter_ns()
@@ -59,7 +67,7 @@ def timed_step(solver: Solver, start: Equilibrium, command: float) -> Timed:
     )
 
 
-def contact_mix(steps: int, seed: int = 0, robot: Robot = Robot.prototype()) -> Iterator[Timed]:  # noqa: B008 - frozen
+def contact_mix(steps: int, seed: int = 0, robot: Robot = Robot.prototype()) -> Iterator[PlanarStep]:  # noqa: B008 - frozen
     """Random increments of ±0.5 mm with a drift towards pulling, 100 steps a scene."""
     generator = np.random.default_rng(seed)
     for _ in range(steps // STEPS_PER_SCENE):
@@ -78,7 +86,7 @@ def call_overhead() -> float:
     return float(np.median([timed_step(solver, solver.rest(), 0.0).microseconds for _ in range(10_000)]))
 
 
-def reference_times(steps: list[Timed]) -> tuple[np.ndarray, np.ndarray]:
+def reference_times(steps: list[PlanarStep]) -> tuple[np.ndarray, np.ndarray]:
     """Times of the kernel and of IPOPT on the same steps [µs]."""
     kernel, reference = [], []
     for step in steps:
@@ -179,7 +187,7 @@ def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
 def measure(steps: int, rivals: int) -> dict[str, Any]:
     """All of the above, by name."""
     times, statuses, touching = np.empty(steps), Counter[str](), 0
-    sample: list[Timed] = []
+    sample: list[PlanarStep] = []
     for i, step in enumerate(contact_mix(steps)):
         times[i] = step.microseconds
         statuses[step.end.status.name] += 1

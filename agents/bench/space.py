@@ -3,10 +3,12 @@
 import math
 import time
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
+from agents.bench.kernel import Timed
 from solver import Scene, Status
 from solver.spatial import Cylinder, SpatialEquilibrium, SpatialRobot, SpatialSolver, Sphere
 
@@ -16,6 +18,7 @@ LARGEST_CABLE = 11.0  # [mm]
 PUSHED = Sphere(center=(40, 18, 104), radius=15)
 WAY = np.array([1.0, 0.4])  # of the cables, towards it
 PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25)])
+SpatialStep = Timed[SpatialSolver, SpatialEquilibrium, np.ndarray]
 
 
 def random_obstacle(generator: np.random.Generator) -> Sphere | Cylinder:
@@ -40,21 +43,19 @@ def random_solver(generator: np.random.Generator, robot: SpatialRobot) -> Spatia
             continue
 
 
-def timed_step(
-    solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndarray
-) -> tuple[SpatialEquilibrium, float]:
-    """Step, with the time of the compiled call alone [µs]."""
+def timed_step(solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialStep:
+    """Step, with the time of the compiled call alone."""
     block, (first, second) = np.empty_like(start.block), cables.tolist()
     begin = time.perf_counter_ns()
     status, iterations = solver._kernel.step(start.block, first, second, solver.robot.length_mm, block)
     elapsed = (time.perf_counter_ns() - begin) / 1e3
-    return SpatialEquilibrium(solver.robot, solver.scene, block, Status(status), iterations), elapsed
+    end = SpatialEquilibrium(solver.robot, solver.scene, block, Status(status), iterations)
+    return Timed(solver, start, cables, end, elapsed)
 
 
-def contact_mix(steps: int, seed: int = 0) -> dict[str, Any]:
+def contact_mix(steps: int, seed: int = 0) -> Iterator[SpatialStep]:
     """Increments of both cables, ±0.3 mm at random beside a drift towards an obstacle or, for one in five, anywhere."""
     generator, robot = np.random.default_rng(seed), SpatialRobot.prototype()
-    times, statuses, touching, crossings = [], Counter[str](), 0, 0
     for _ in range(steps // STEPS_PER_SCENE):
         solver = random_solver(generator, robot)
         now, goal = solver.rest(), np.zeros(2)
@@ -62,12 +63,19 @@ def contact_mix(steps: int, seed: int = 0) -> dict[str, Any]:
             if k % GOAL_STEPS == 0:
                 goal = _goal(generator, solver)
             drift = 0.06 * (goal - now.cables_mm) + generator.uniform(-0.3, 0.3, 2)
-            command = np.clip(now.cables_mm + drift, -LARGEST_CABLE, LARGEST_CABLE)
-            crossings += bool((command * now.cables_mm < 0).any())
-            now, elapsed = timed_step(solver, now, command)
-            times.append(elapsed)
-            statuses[now.status.name] += 1
-            touching += bool(now.contact.any())
+            step = timed_step(solver, now, np.clip(now.cables_mm + drift, -LARGEST_CABLE, LARGEST_CABLE))
+            yield step
+            now = step.end
+
+
+def summary(mix: Iterable[SpatialStep]) -> dict[str, Any]:
+    """Times and events of a mix."""
+    times, statuses, touching, crossings = [], Counter[str](), 0, 0
+    for step in mix:
+        times.append(step.microseconds)
+        statuses[step.end.status.name] += 1
+        touching += bool(step.end.contact.any())
+        crossings += bool((step.command * step.start.cables_mm < 0).any())
     return {
         "steps": len(times),
         "in_contact": touching / len(times),
@@ -96,8 +104,9 @@ def path_times(segments: int) -> list[float]:
     solver = SpatialSolver(SpatialRobot.prototype(segments=segments), Scene([PUSHED]))
     now, times = solver.rest(), []
     for pull in PATH:
-        now, elapsed = timed_step(solver, now, pull * WAY)
-        times.append(elapsed)
+        step = timed_step(solver, now, pull * WAY)
+        now = step.end
+        times.append(step.microseconds)
     return times
 
 
@@ -105,7 +114,7 @@ def measure(steps: int) -> dict[str, Any]:
     """All of the above, by name."""
     means = growth((9, 18, 36, 72, 144))
     return {
-        **contact_mix(steps),
+        **summary(contact_mix(steps)),
         "segments_mean_us": {str(n): mean for n, mean in means.items()},
         "growth_exponent": float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0]),
     }

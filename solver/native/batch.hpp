@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -25,7 +26,7 @@ class Batch {
   // Calls `work` with a follower among the obstacles of each of some robots, and the place of the robot in the list, until
   // the calling thread is told to `stop`.
   template <class Work, class Stop>
-  void each(const std::vector<int>& robots, Work work, Stop& stop) {
+  void each(const std::vector<int>& robots, Work work, Stop&& stop) {
     std::atomic<int> next = 0;
     const int count = static_cast<int>(robots.size());
     const auto run = [&](int thread) {
@@ -39,7 +40,13 @@ class Batch {
       }
     };
     if (workers_.size() == 1 || count <= kAlone) return run(0);
-    pool_.run(run);
+    pool_.run(std::ref(run));  // a function that holds it would be allocated
+  }
+
+  template <class Work>
+  void each(const std::vector<int>& robots, Work work) {
+    const auto never = [] { return false; };
+    each(robots, work, never);
   }
 
  private:

@@ -29,7 +29,7 @@ def test_kernel():
 
 
 def test_kernel_in_space():
-    found = space.contact_mix(400)
+    found = space.summary(space.contact_mix(400))
     assert found["steps"] == 400
     assert found["sign_changes"] > 0
     assert space.growth((9, 18), repeats=1).keys() == {9, 18}

@@ -1,0 +1,184 @@
+// Robots and obstacles as the tests, the fuzz and the benchmarks' replay make them: the only place that fills in their
+// fields, as solver/robot.py and solver/obstacles.py do for Python.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "obstacle.hpp"
+#include "robot.hpp"
+#include "sweep.hpp"
+
+namespace ccr::testing {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+inline constexpr double kQuarterTurn = 1.5707963267948966;
+
+// The numbers that describe a robot; those of the paper's prototype unless told.
+struct RobotNumbers {
+  bool sliding = false;
+  int segments = 18;
+  double length = 180, offset = 8, rigidity = 5000, max_tension = 15;
+  double angle = kQuarterTurn;  // between the cables, in space
+  int between = 0;
+};
+
+// A robot that is touched on these lines, each a place on its disks.
+inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
+  const double segment = of.length / of.segments;
+  std::vector<double> edges;  // stretched by as much as the disks of a segment can turn, about
+  for (const Vec<2>& line : lines)
+    edges.push_back((segment + norm(line) * (of.sliding ? segment / of.offset : 0.4)) / (of.between + 1));
+  return {.sliding = of.sliding,
+          .segments = of.segments,
+          .offset = of.offset,
+          .angle = of.angle,
+          .rigidity = of.rigidity,
+          .max_tension = of.max_tension,
+          .max_length = of.length,
+          .disk_radius = of.offset,
+          .disk_thickness = 0,
+          .lines = std::move(lines),
+          .edges = std::move(edges),
+          .between = of.between};
+}
+
+// Touched on backbone and cable in the plane; in space on the backbone, the holes of both cables, and opposite them.
+template <int D>
+Robot make_robot(const RobotNumbers& of) {
+  const double a = of.offset, x = a * std::cos(of.angle), y = a * std::sin(of.angle);
+  if (D == 2) return make_robot(of, {{{0, 0}}, {{a, 0}}});
+  return make_robot(of, {{{0, 0}}, {{a, 0}}, {{x, y}}, {{-a, 0}}, {{-x, -y}}});
+}
+
+template <int D>
+Position<D> position(const double* numbers) {
+  Position<D> out;
+  std::copy_n(numbers, D, out.v.begin());
+  return out;
+}
+
+template <int D>
+Position<D> middle(const Position<D>& a, const Position<D>& b) {
+  Position<D> out;
+  for (int k = 0; k < D; ++k) out[k] = (a[k] + b[k]) / 2;
+  return out;
+}
+
+// A ball that holds a shape, and the smallest radius of its surface.
+template <int D>
+struct Extent {
+  Position<D> center;
+  double radius, fineness;
+};
+
+template <int D>
+Extent<D> wall_extent(const double* p) {
+  Position<D> on_surface = position<D>(p);
+  for (double& part : on_surface.v) part *= p[D];
+  return {on_surface, kInfinity, kInfinity};
+}
+
+template <int D>
+Extent<D> capsule_extent(const double* p) {
+  const Position<D> start = position<D>(p), end = position<D>(p + D);
+  return {middle(start, end), norm(minus(end, start)) / 2 + p[2 * D], p[2 * D]};
+}
+
+inline Extent<2> polygon_extent(const double* p) {
+  constexpr int kCorners = (kShapeSize - 1) / 2;
+  Position<2> center;
+  for (int k = 0; k < kCorners; ++k)
+    for (int c = 0; c < 2; ++c) center[c] += p[1 + 2 * k + c] / kCorners;
+  double farthest = 0;
+  for (int k = 0; k < kCorners; ++k)
+    farthest = std::max(farthest, norm(minus(position<2>(p + 1 + 2 * k), center)));
+  return {center, farthest + p[0], p[0]};
+}
+
+inline Extent<2> extent_of(Shape shape, const double* p, Position<2>) {
+  switch (shape) {
+    case Shape::kCircle: return {position<2>(p), p[2], p[2]};
+    case Shape::kHalfPlane: return wall_extent<2>(p);
+    case Shape::kCapsule: return capsule_extent<2>(p);
+    case Shape::kPolygon: return polygon_extent(p);
+    default: {  // an ellipse
+      const double large = std::max(p[2], p[3]), small = std::min(p[2], p[3]);
+      return {position<2>(p), large, small * small / large};
+    }
+  }
+}
+
+inline Extent<3> extent_of(Shape shape, const double* p, Position<3>) {
+  switch (shape) {
+    case Shape::kSphere: return {position<3>(p), p[3], p[3]};
+    case Shape::kHalfSpace: return wall_extent<3>(p);
+    case Shape::kSpatialCapsule: return capsule_extent<3>(p);
+    case Shape::kCylinder: return {position<3>(p), std::hypot(p[6] + p[8], p[7] + p[8]), p[8]};
+    default: return {position<3>(p), std::hypot(p[12] + p[15], p[13] + p[15], p[14] + p[15]), p[15]};  // a box
+  }
+}
+
+// Points of an ellipse, whose gap is no distance.
+inline std::vector<Position<2>> ellipse_outline(const double* p) {
+  std::vector<Position<2>> outline;
+  for (int k = 0; k < 96; ++k) {
+    const double along = p[2] * std::cos(k * kQuarterTurn / 24), across = p[3] * std::sin(k * kQuarterTurn / 24);
+    outline.push_back({{p[0] + along * p[4] - across * p[5], p[1] + along * p[5] + across * p[4]}});
+  }
+  return outline;
+}
+
+// An obstacle that all points of a robot can touch, from its shape as the gap laws take it. On a spring where
+// `stiffness` is positive [N/mm].
+template <int D>
+Obstacle<D> make_obstacle(const Robot& robot, Shape shape, std::span<const double> parameters, double stiffness = 0) {
+  const Extent<D> extent = extent_of(shape, parameters.data(), Position<D>{});
+  Obstacle<D> obstacle{};
+  obstacle.shape = shape;
+  std::copy(parameters.begin(), parameters.end(), obstacle.parameters.begin());
+  obstacle.center = extent.center;
+  obstacle.radius = extent.radius;
+  obstacle.fineness = extent.fineness;
+  if constexpr (D == 2)
+    if (shape == Shape::kEllipse) obstacle.outline = ellipse_outline(parameters.data());
+  obstacle.inradius = obstacle.wall() ? kInfinity : depth(obstacle, obstacle.center);
+  obstacle.touchable.assign(robot.points(), 1);
+  obstacle.everywhere = true;
+  obstacle.mounted = stiffness > 0;
+  for (int k = 0; k < D; ++k) obstacle.stiffness(k, k) = stiffness;
+  return obstacle;
+}
+
+// The same, for one point of the robot alone.
+template <int D>
+Obstacle<D> for_point(Obstacle<D> obstacle, int point) {
+  std::fill(obstacle.touchable.begin(), obstacle.touchable.end(), static_cast<unsigned char>(0));
+  obstacle.touchable[point] = 1;
+  obstacle.everywhere = false;
+  return obstacle;
+}
+
+inline Obstacle<2> circle(const Robot& robot, double x, double y, double r, double stiffness = 0) {
+  return make_obstacle<2>(robot, Shape::kCircle, std::array{x, y, r}, stiffness);
+}
+
+inline Obstacle<3> sphere(const Robot& robot, double x, double y, double z, double r, double stiffness = 0) {
+  return make_obstacle<3>(robot, Shape::kSphere, std::array{x, y, z, r}, stiffness);
+}
+
+// Half of the plane or of space: outward unit normal and offset.
+template <int D>
+Obstacle<D> wall(const Robot& robot, const Position<D>& normal, double offset, double stiffness = 0) {
+  std::array<double, D + 1> parameters;
+  std::copy(normal.v.begin(), normal.v.end(), parameters.begin());
+  parameters[D] = offset;
+  return make_obstacle<D>(robot, D == 2 ? Shape::kHalfPlane : Shape::kHalfSpace, parameters, stiffness);
+}
+
+}  // namespace ccr::testing

@@ -1,0 +1,170 @@
+// No step allocates: the global operators count.
+#include <doctest/doctest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "batch.hpp"
+#include "scenes.hpp"
+
+namespace {
+std::atomic<long> allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void* operator new[](std::size_t size) { return operator new(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace ccr::testing {
+namespace {
+
+// A robot that is pulled along a path, in steps that are looked at one by one.
+template <int D>
+class Pulled {
+ public:
+  Pulled(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles)
+      : of_(of), view_(make_robot<D>(of), obstacles.size()), obstacles_(obstacles),
+        follower_(make_follower<D>(make_robot<D>(of), static_cast<int>(obstacles.size()))) {
+    follower_->enter(obstacles_);
+    now_ = to_ = rest_block(*follower_, of.length);
+    rest_ = now_;
+  }
+
+  // Goes to a displacement in equal steps, along a direction in space, and counts.
+  void pull(double to, int steps, double second = 0.4) {
+    const double from = now_[0];
+    for (int k = 1; k <= steps; ++k) {
+      std::array<double, D> command;
+      command[0] = from + (to - from) * k / steps;
+      if (D == 3) command[1] = second * command[0];
+      command[D - 1] = of_.length;
+      const long before = allocations;
+      const Status status = follower_->follow(now_.data(), command.data(), to_.data());
+      allocated += allocations - before;
+      ++met[static_cast<int>(status)];
+      std::swap(now_, to_);
+      touched += now_[view_.force] != 0;
+    }
+  }
+
+  // Forgets what was counted, from rest.
+  void begin() {
+    now_ = rest_;
+    allocated = touched = 0;
+    met = {};
+  }
+
+  long allocated = 0, touched = 0;
+  std::array<int, 5> met{};  // statuses
+
+ private:
+  RobotNumbers of_;
+  View<D> view_;
+  std::vector<Obstacle<D>> obstacles_;
+  std::unique_ptr<Follower<D>> follower_;
+  std::vector<double> rest_, now_, to_;
+};
+
+// There and back twice, the first time to warm up; returns what the second allocated.
+template <int D>
+Pulled<D> twice(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles, double to) {
+  Pulled<D> pulled(of, obstacles);
+  for (int round = 0; round < 2; ++round) {
+    pulled.begin();
+    pulled.pull(to, 40);
+    pulled.pull(0, 40);
+  }
+  return pulled;
+}
+
+RobotNumbers prototype(bool sliding = false) {
+  RobotNumbers of;
+  of.sliding = sliding;
+  return of;
+}
+
+int met(const auto& pulled, Status status) { return pulled.met[static_cast<int>(status)]; }
+
+TEST_CASE("a free robot's steps allocate nothing") {
+  for (const bool sliding : {false, true}) CHECK(twice<2>(prototype(sliding), {}, 8).allocated == 0);
+  CHECK(twice<3>(prototype(), {}, 6).allocated == 0);
+}
+
+TEST_CASE("steps in contact allocate nothing, stalls included") {
+  for (const double stiffness : {0.0, 0.05}) {
+    for (const bool sliding : {false, true}) {
+      RobotNumbers of = prototype(sliding);
+      of.max_tension = 5;
+      const Robot robot = make_robot<2>(of);
+      const auto pulled = twice<2>(of, {circle(robot, 44, 104, 15, stiffness), circle(robot, 90, 150, 10)}, 14);
+      CHECK(pulled.allocated == 0);
+      CHECK(pulled.touched > 20);
+      if (stiffness == 0) CHECK(met(pulled, Status::kStalled) > 0);
+    }
+    const Robot robot = make_robot<3>(prototype());
+    const auto pulled = twice<3>(prototype(), {sphere(robot, 40, 18, 104, 15, stiffness)}, 8);
+    CHECK(pulled.allocated == 0);
+    CHECK(pulled.touched > 20);
+  }
+}
+
+TEST_CASE("steps beside every shape allocate nothing") {
+  Random random(1);
+  const Robot plane = make_robot<2>(prototype()), space = make_robot<3>(prototype());
+  for (int shape = 0; shape < kShapes; ++shape) {
+    CAPTURE(shape);
+    CHECK(twice<2>(prototype(), {random_obstacle(random, plane, shape, Position<2>{{50, 100}}, 12, 0)}, 6).allocated == 0);
+    CHECK(twice<3>(prototype(), {random_obstacle(random, space, shape, Position<3>{{50, 20, 100}}, 12, 0)}, 6).allocated == 0);
+  }
+}
+
+// The descent after a branch end keeps copies of where it began.
+TEST_CASE("snaps allocate nothing" * doctest::should_fail()) {
+  int snaps = 0;
+  long allocated = 0;
+  for (const bool sliding : {false, true})
+    for (double x = 30; x < 60; x += 3) {
+      const Robot robot = make_robot<2>(prototype(sliding));
+      const auto pulled = twice<2>(prototype(sliding), {circle(robot, x, 165, 10)}, 14);
+      snaps += met(pulled, Status::kSnapped);
+      allocated += pulled.allocated;
+    }
+  CHECK(snaps > 0);
+  CHECK(allocated == 0);
+}
+
+TEST_CASE("a batch's steps allocate nothing") {
+  const RobotNumbers of = prototype();
+  const Robot robot = make_robot<2>(of);
+  constexpr int kCount = 64;
+  Batch<2> batch(robot, kCount, 1, 2);
+  std::vector<int> robots;
+  for (int i = 0; i < kCount; ++i) {
+    batch.scene(i) = {circle(robot, 44 + 0.1 * i, 104, 15)};
+    robots.push_back(i);
+  }
+  std::vector<double> blocks(kCount * batch.block_size());
+  const auto step = [&](double cable) {
+    batch.each(robots, [&](Follower<2>& follower, int k) {
+      double* block = blocks.data() + k * batch.block_size();
+      const double command[] = {cable, of.length};
+      if (cable == 0) block[1] = of.length;
+      follower.follow(block, command, block);
+    });
+  };
+  for (double cable = 0; cable < 5; cable += 0.25) step(cable);
+  const long before = allocations;
+  for (double cable = 5; cable > 1; cable -= 0.25) step(cable);
+  CHECK(allocations == before);
+}
+
+}  // namespace
+}  // namespace ccr::testing

@@ -1,0 +1,136 @@
+// A batch of robots: the bits of each are those it has alone, for any number of threads, batch size and order.
+#include <doctest/doctest.h>
+
+#include <cstring>
+
+#include "batch.hpp"
+#include "scenes.hpp"
+
+namespace ccr::testing {
+namespace {
+
+template <int D>
+struct Work {
+  explicit Work(Random& random, const RobotNumbers& of, int count) : robot(make_robot<D>(of)), length(of.length) {
+    for (int i = 0; i < count; ++i) {
+      settings.push_back(random_setting<D>(random, of, kObstacles));
+      for (int step = 1; step <= kSteps; ++step) wanted.push_back(towards(random, settings.back().obstacles[0].center, step));
+    }
+  }
+
+  // Cables that pull more with each step, towards a place in space.
+  std::array<double, D> towards(Random& random, const Position<D>& place, int step) const {
+    const double pull = 1.1 * robot.offset * step / kSteps * random.uniform(0.9, 1.1);
+    if constexpr (D == 2) return {pull, length};
+    const double away = std::hypot(place[0], place[1]);
+    std::array<double, D> command{};
+    for (int k = 0; k < D - 1; ++k) command[k] = pull * place[k] / away;
+    command[D - 1] = length;
+    return command;
+  }
+
+  static constexpr int kObstacles = 2, kSteps = 12;
+
+  // Blocks, statuses and iterations of all robots after all steps.
+  struct Reached {
+    std::vector<double> blocks;
+    std::vector<int> statuses, iterations;
+
+    bool operator==(const Reached& other) const {
+      return blocks.size() == other.blocks.size() && statuses == other.statuses && iterations == other.iterations &&
+             std::memcmp(blocks.data(), other.blocks.data(), blocks.size() * sizeof(double)) == 0;
+    }
+  };
+
+  void follow(Follower<D>& follower, int robot, int step, Reached& to) const {
+    double* block = to.blocks.data() + static_cast<std::size_t>(robot) * follower.block_size();
+    const std::array<double, D> command = wanted[static_cast<std::size_t>(robot * kSteps + step)];
+    to.statuses[static_cast<std::size_t>(robot)] = static_cast<int>(follower.follow(block, command.data(), block));
+    to.iterations[static_cast<std::size_t>(robot)] += follower.iterations;
+  }
+
+  Reached begin() const {
+    Reached out;
+    for (const Setting<D>& setting : settings) out.blocks.insert(out.blocks.end(), setting.rest.begin(), setting.rest.end());
+    out.statuses.assign(settings.size(), 0);
+    out.iterations.assign(settings.size(), 0);
+    return out;
+  }
+
+  Reached alone() const {
+    Reached out = begin();
+    for (int i = 0; i < static_cast<int>(settings.size()); ++i) {
+      const auto follower = make_follower<D>(robot, kObstacles);
+      follower->enter(settings[static_cast<std::size_t>(i)].obstacles);
+      for (int step = 0; step < kSteps; ++step) follow(*follower, i, step, out);
+    }
+    return out;
+  }
+
+  // Some robots at a time, from the last one on or from the first.
+  Reached together(int threads, int at_a_time, bool backwards) const {
+    const int count = static_cast<int>(settings.size());
+    Batch<D> batch(robot, count, kObstacles, threads);
+    for (int i = 0; i < count; ++i) batch.scene(i) = settings[static_cast<std::size_t>(i)].obstacles;
+    Reached out = begin();
+    for (int step = 0; step < kSteps; ++step)
+      for (int first = 0; first < count; first += at_a_time) {
+        std::vector<int> robots;
+        for (int k = first; k < std::min(first + at_a_time, count); ++k) robots.push_back(backwards ? count - 1 - k : k);
+        batch.each(robots, [&](Follower<D>& follower, int k) { follow(follower, robots[static_cast<std::size_t>(k)], step, out); });
+      }
+    return out;
+  }
+
+  Robot robot;
+  double length;
+  std::vector<Setting<D>> settings;
+  std::vector<std::array<double, D>> wanted;
+};
+
+template <int D>
+void compare(bool sliding) {
+  Random random(1);
+  RobotNumbers of;
+  of.sliding = sliding;
+  const Work<D> work(random, of, 24);
+  const auto alone = work.alone();
+  int touching = 0;
+  const View<D> view(work.robot, work.kObstacles);
+  for (std::size_t i = 0; i < work.settings.size(); ++i)
+    touching += alone.blocks[i * work.settings[0].rest.size() + view.force] != 0;
+  CHECK(touching > 3);
+  for (const int threads : {1, 2, 4})
+    for (const int at_a_time : {1, 17, 24}) {
+      CAPTURE(threads);
+      CAPTURE(at_a_time);
+      CHECK(work.together(threads, at_a_time, at_a_time == 17) == alone);
+    }
+}
+
+TEST_CASE("a batch's bits are those of robots alone, in the plane") {
+  compare<2>(false);
+  compare<2>(true);
+}
+
+TEST_CASE("a batch's bits are those of robots alone, in space") { compare<3>(false); }
+
+TEST_CASE("every robot of a call is worked on once") {
+  Batch<2> batch(make_robot<2>({}), 100, 0, 4);
+  std::vector<int> robots(100), visits(100);
+  for (int i = 0; i < 100; ++i) robots[i] = i;
+  for (int call = 0; call < 300; ++call) batch.each(robots, [&](Follower<2>&, int k) { ++visits[k]; });
+  for (const int count : visits) CHECK(count == 300);
+}
+
+TEST_CASE("pools come and go, asked for work or not") {
+  for (int round = 0; round < 50; ++round) {
+    Pool idle(3), pool(3);
+    std::atomic<int> sum = 0;
+    pool.run([&](int thread) { sum += thread + 1; });
+    CHECK(sum == 10);
+  }
+}
+
+}  // namespace
+}  // namespace ccr::testing

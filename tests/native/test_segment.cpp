@@ -1,0 +1,319 @@
+// The laws of a segment: the geometry they stand for, their derivatives, and that wide registers change no bit.
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <numbers>
+
+#include "random.hpp"
+#include "segment.hpp"
+
+namespace ccr {
+
+#ifdef CCR_WIDE
+#define CCR_DECLARE(REGISTERS)                                                                                          \
+  namespace REGISTERS {                                                                                                 \
+  void bend(int, const double*, double, double, double, UniformCable::Bends&);                                          \
+  void bend(int, const double*, double, double, SlidingCable::Bends&);                                                  \
+  bool bend(int, const TwoCables::Told&, const Rows&, Rows&, Rows&);                                                    \
+  void bow(int, const TwoCables::Told&, const Rows&, const Rows&, const Rows&, Rows&);                                  \
+  }
+CCR_DECLARE(baseline)
+CCR_DECLARE(wide)
+#endif
+
+namespace testing {
+namespace {
+
+constexpr double kScales[] = {1e-3, 1, 1e3};  // of a robot whose segments are 10 mm long, with disks of 8 mm
+constexpr double kDifference = 1e-5;          // of a coordinate, for central differences
+constexpr double kClose = 1e-8;               // what they leave, relative to slopes of about one
+
+bool near(double a, double b, double scale) { return std::abs(a - b) <= kClose * scale; }
+
+UniformCable::Bend uniform(double sine, double pull, double scale) {
+  UniformCable::Bends bends(1);
+  UniformCable::bend(1, &sine, pull * scale, 10 * scale, 8 * scale, bends);
+  return bends[0];
+}
+
+SlidingCable::Bend sliding(double angle, double scale) {
+  SlidingCable::Bends bends(1);
+  SlidingCable::bend(1, &angle, 0, 10 * scale, 8 * scale, bends);
+  return bends[0];
+}
+
+// Length of the cable between the holes of two disks, from where the upper node is and how far its disk is turned.
+double cable_length(double forward, double sideways, double cosine, double sine, double scale) {
+  const double x = -10 * sideways + 8 * cosine - 8, y = 10 * forward - 8 * sine;
+  return scale * std::hypot(x, y);
+}
+
+double heading(const UniformCable::Bend& bend) { return std::atan2(bend.sideways, bend.forward); }
+double chord(const SlidingCable::Bend& bend) { return std::hypot(bend.forward, bend.sideways); }
+
+TEST_CASE("a segment of a uniform cable is as long as its cables say") {
+  for (const double scale : kScales)
+    for (const double pull : {0.0, 0.05, 0.4, 0.78})
+      for (const double sine : {-0.6, -0.1, 0.0, 0.3, 0.7}) {
+        const auto bend = uniform(sine, pull, scale);
+        CHECK(std::hypot(bend.forward, bend.sideways) == doctest::Approx(1).epsilon(1e-14));
+        CHECK(bend.cosine == doctest::Approx(std::cos(bend.angle)).epsilon(1e-14));
+        CHECK(bend.sine == doctest::Approx(std::sin(bend.angle)).epsilon(1e-14));
+        CHECK(heading(bend) == doctest::Approx(std::asin(sine) - bend.angle / 2).epsilon(1e-13));
+        CHECK(cable_length(bend.forward, bend.sideways, bend.cosine, bend.sine, scale) ==
+              doctest::Approx((10 - pull) * scale).epsilon(1e-14));
+      }
+}
+
+TEST_CASE("the slopes of a uniform cable's segment are those of its shape") {
+  for (const double scale : kScales)
+    for (const double pull : {0.0, 0.05, 0.4, 0.78})
+      for (const double sine : {-0.6, -0.1, 0.0, 0.3, 0.7}) {
+        CAPTURE(scale);
+        CAPTURE(pull);
+        CAPTURE(sine);
+        const double h = kDifference;
+        const auto at = uniform(sine, pull, scale), more = uniform(sine + h, pull, scale), less = uniform(sine - h, pull, scale);
+        CHECK(near(at.slope, (more.angle - less.angle) / (2 * h), 1));
+        CHECK(near(at.curvature, (more.slope - less.slope) / (2 * h), 1));
+        CHECK(near(at.heading_slope, (heading(more) - heading(less)) / (2 * h), 1));
+        CHECK(near(at.heading_curvature, (more.heading_slope - less.heading_slope) / (2 * h), 10));
+        const auto pulled = uniform(sine, pull + h, scale), eased = uniform(sine, pull - h, scale);
+        CHECK(near(at.pull_slope * scale, (pulled.angle - eased.angle) / (2 * h), 1));
+      }
+}
+
+TEST_CASE("a segment that shears beyond its cable has no shape") { CHECK(std::isnan(uniform(0.99, 0.9, 1).angle)); }
+
+TEST_CASE("a segment of a sliding cable is an arc, and takes what the way between its holes is short of") {
+  for (const double scale : kScales)
+    for (const double angle : {-2.5, -0.4, 0.0, 1e-5, 0.1, 1.1}) {  // until the disks meet
+      const auto bend = sliding(angle, scale);
+      CHECK(bend.cosine == doctest::Approx(std::cos(angle)).epsilon(1e-13));
+      CHECK(bend.sine == doctest::Approx(std::sin(angle)).epsilon(1e-13));
+      CHECK(chord(bend) == doctest::Approx(angle == 0 ? 1 : std::sin(angle / 2) / (angle / 2)).epsilon(1e-13));
+      CHECK(bend.forward * std::sin(angle / 2) == doctest::Approx(-bend.sideways * std::cos(angle / 2)).epsilon(1e-13));
+      const double left = cable_length(bend.forward, bend.sideways, bend.cosine, bend.sine, scale);
+      CHECK(std::abs(10 * scale - bend.taken - left) <= 1e-13 * scale);
+    }
+}
+
+TEST_CASE("the slopes of a sliding cable's segment are those of its shape") {
+  for (const double scale : kScales)
+    for (const double angle : {-2.5, -0.4, 0.0, 1e-5, 0.1, 1.0, 3.0}) {
+      CAPTURE(angle);
+      const double h = kDifference;
+      const auto at = sliding(angle, scale), more = sliding(angle + h, scale), less = sliding(angle - h, scale);
+      CHECK(near(at.stretch * chord(at), (chord(more) - chord(less)) / (2 * h), 1));
+      CHECK(near(at.stretch_slope * chord(at), (more.stretch * chord(more) - less.stretch * chord(less)) / (2 * h), 1));
+      CHECK(near(at.taken_slope, (more.taken - less.taken) / (2 * h), 10 * scale));
+      CHECK(near(at.taken_curvature, (more.taken_slope - less.taken_slope) / (2 * h), 10 * scale));
+    }
+}
+
+// A segment in space, and what its law says.
+struct InSpace {
+  Vec<3> chord;
+  Mat<3, 3> rotation;
+  double objective;
+  Vec<3> objective_slope;
+  Mat<3, 3> chord_slope, turn_slope;
+  Vec<2> objective_pull_slope;
+  Mat<3, 2> chord_pull_slope, turn_pull_slope;
+};
+static_assert(sizeof(InSpace) == TwoCables::kBend * sizeof(double));
+
+TwoCables::Told told(const Vec<2>& pulls, double angle, double scale) {
+  return {{pulls[0] * scale, pulls[1] * scale}, 10 * scale, {8 * scale, 0, 8 * scale * std::cos(angle), 8 * scale * std::sin(angle)}};
+}
+
+struct Space {
+  explicit Space(int n) : controls(TwoCables::kControl, n), bendings(TwoCables::kBending, n), bends(TwoCables::kBend, n) {}
+
+  bool bend(int n, const TwoCables::Told& told) { return TwoCables::bend(n, told, controls, bendings, bends); }
+  InSpace at(int segment) const {
+    InSpace out;
+    bends.get(segment, out.chord.v.data(), TwoCables::kBend);
+    return out;
+  }
+
+  Rows controls, bendings, bends;
+};
+
+InSpace in_space(const Vec<3>& control, const TwoCables::Told& told) {
+  Space space(1);
+  space.controls.put(0, control.v.data(), 3);
+  REQUIRE(space.bend(1, told));
+  return space.at(0);
+}
+
+Mat<3, 3> bow(const Vec<3>& control, const TwoCables::Told& told, const Vec<3>& force, const Vec<3>& moment) {
+  Space space(1);
+  space.controls.put(0, control.v.data(), 3);
+  REQUIRE(space.bend(1, told));
+  Rows adjoints(TwoCables::kAdjoint, 1), bows(TwoCables::kBow, 1);
+  adjoints.put(0, force.v.data(), 3);
+  adjoints.put(0, moment.v.data(), 3, 3);
+  TwoCables::bow(1, told, space.controls, space.bendings, adjoints, bows);
+  Mat<3, 3> out;
+  bows.get(0, out.v.data(), TwoCables::kBow);
+  return out;
+}
+
+// Slope in the control of the objective and of the work of a force on the chord and a moment on the turn.
+Vec<3> slope(const InSpace& bend, const Vec<3>& force, const Vec<3>& moment) {
+  Vec<3> out = bend.objective_slope;
+  out += transpose_times(bend.chord_slope, force);
+  out += transpose_times(bend.turn_slope, moment);
+  return out;
+}
+
+// Turn from one rotation to one close to it, in the frame that both lead to.
+Vec<3> turn(const Mat<3, 3>& from, const Mat<3, 3>& to) {
+  Mat<3, 3> between;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < 3; ++k) between(r, c) += to(r, k) * from(c, k);
+  return {{(between(2, 1) - between(1, 2)) / 2, (between(0, 2) - between(2, 0)) / 2, (between(1, 0) - between(0, 1)) / 2}};
+}
+
+struct Case {
+  Vec<3> control;
+  Vec<2> pulls;
+  double angle, scale;
+};
+
+std::vector<Case> cases() {
+  Random random(1);
+  std::vector<Case> out;
+  for (const double scale : kScales)
+    for (int k = 0; k < 20; ++k)
+      out.push_back({random.matrix<3>(0.15), {{random.uniform(0, 0.6), random.uniform(0, 0.6)}},
+                     random.uniform(0.3, 0.7) * std::numbers::pi, scale});
+  return out;
+}
+
+TEST_CASE("a segment in space is as long as its cables say") {
+  for (const Case& c : cases()) {
+    const TwoCables::Told all = told(c.pulls, c.angle, c.scale);
+    const InSpace bend = in_space(c.control, all);
+    CHECK(norm(bend.chord) == doctest::Approx(all.length).epsilon(1e-14));
+    for (int k = 0; k < 2; ++k) {
+      const Vec<3> hole = {{all.holes[2 * k], all.holes[2 * k + 1], 0}};
+      Vec<3> way = times(bend.rotation, hole);
+      way += bend.chord;
+      way -= hole;
+      CHECK(norm(way) == doctest::Approx(all.length - all.pulls[k]).epsilon(1e-13));
+    }
+  }
+}
+
+TEST_CASE("the slopes of a segment in space are those of its shape") {
+  const double h = kDifference;
+  for (const Case& c : cases()) {
+    const TwoCables::Told all = told(c.pulls, c.angle, c.scale);
+    const InSpace at = in_space(c.control, all);
+    const auto compare = [&](const InSpace& more, const InSpace& less, double step, double objective, const Vec<3>& chord,
+                             const Vec<3>& turned, double unit) {
+      CHECK(near(objective * unit, (more.objective - less.objective) / step * unit, 1));
+      const Vec<3> moved = minus(more.chord, less.chord), around = turn(less.rotation, more.rotation);
+      for (int k = 0; k < 3; ++k) {
+        CHECK(near(chord[k] * unit, moved[k] / step * unit, 10 * c.scale));
+        CHECK(near(turned[k] * unit, around[k] / step * unit, 1));
+      }
+    };
+    const auto column = [](const auto& matrix, int k) { return Vec<3>{{matrix(0, k), matrix(1, k), matrix(2, k)}}; };
+    for (int k = 0; k < 3; ++k) {
+      Vec<3> up = c.control, down = c.control;
+      up[k] += h;
+      down[k] -= h;
+      compare(in_space(up, all), in_space(down, all), 2 * h, at.objective_slope[k], column(at.chord_slope, k),
+              column(at.turn_slope, k), 1);
+    }
+    for (int k = 0; k < 2; ++k) {
+      Vec<2> up = c.pulls, down = c.pulls;
+      up[k] += h;
+      down[k] -= h;
+      compare(in_space(c.control, told(up, c.angle, c.scale)), in_space(c.control, told(down, c.angle, c.scale)),
+              2 * h * c.scale, at.objective_pull_slope[k], column(at.chord_pull_slope, k), column(at.turn_pull_slope, k), c.scale);
+    }
+  }
+}
+
+TEST_CASE("the curvature of a segment in space is that of its work") {
+  Random random(2);
+  const double h = kDifference;
+  for (const Case& c : cases()) {
+    const TwoCables::Told all = told(c.pulls, c.angle, c.scale);
+    const Vec<3> force = random.matrix<3>(1 / c.scale), moment = random.matrix<3>();
+    const Mat<3, 3> curved = bow(c.control, all, force, moment);
+    Mat<3, 3> found;
+    for (int k = 0; k < 3; ++k) {
+      Vec<3> up = c.control, down = c.control;
+      up[k] += h;
+      down[k] -= h;
+      const Vec<3> more = slope(in_space(up, all), force, moment), less = slope(in_space(down, all), force, moment);
+      for (int r = 0; r < 3; ++r) {  // a turn's second derivative is taken to be symmetric
+        found(r, k) += (more[r] - less[r]) / (4 * h);
+        found(k, r) += (more[r] - less[r]) / (4 * h);
+      }
+    }
+    for (int k = 0; k < 9; ++k) CHECK(near(curved[k], found[k], 100));
+  }
+}
+
+TEST_CASE("cables that cannot have their lengths are refused") {
+  Space space(3);
+  const double sheared[] = {2, 0, 0};
+  space.controls.put(1, sheared, 3);
+  CHECK_FALSE(space.bend(3, told({{0.1, 0.1}}, 1.5, 1)));
+}
+
+#ifdef CCR_WIDE
+
+bool same_bits(const Rows& a, const Rows& b, int numbers, int segments) {
+  for (int k = 0; k < numbers; ++k)
+    if (std::memcmp(a.row(k), b.row(k), static_cast<std::size_t>(segments) * sizeof(double)) != 0) return false;
+  return true;
+}
+
+TEST_CASE("wide registers change no bit" * doctest::skip(!__builtin_cpu_supports("avx2"))) {
+  Random random(3);
+  for (int n = 1; n < 40; ++n) {
+    std::vector<double> coordinates(static_cast<std::size_t>(n));
+    for (double& one : coordinates) one = random.uniform(-1, 1);  // some beyond the range of the law
+    const double pull = random.uniform(0, 0.8);
+    UniformCable::Bends one(n), four(n);
+    baseline::bend(n, coordinates.data(), pull, 10, 8, one);
+    wide::bend(n, coordinates.data(), pull, 10, 8, four);
+    CHECK(same_bits(one, four, UniformCable::Bends::kLaws, n));
+
+    for (double& angle : coordinates) angle *= 3;
+    SlidingCable::Bends arc(n), arcs(n);
+    baseline::bend(n, coordinates.data(), 10, 8, arc);
+    wide::bend(n, coordinates.data(), 10, 8, arcs);
+    CHECK(same_bits(arc, arcs, SlidingCable::Bends::kLaws, n));
+
+    const TwoCables::Told all = told({{random.uniform(0, 0.6), random.uniform(0, 0.6)}}, 1.3, 1);
+    Space narrow(n), broad(n);
+    Rows adjoints(TwoCables::kAdjoint, n), bow(TwoCables::kBow, n), bows(TwoCables::kBow, n);
+    for (int i = 0; i < n; ++i) {
+      narrow.controls.put(i, random.matrix<3>(0.15).v.data(), 3);
+      adjoints.put(i, random.matrix<6>().v.data(), 6);
+    }
+    broad.controls = narrow.controls;
+    CHECK(baseline::bend(n, all, narrow.controls, narrow.bendings, narrow.bends));
+    CHECK(wide::bend(n, all, broad.controls, broad.bendings, broad.bends));
+    CHECK(same_bits(narrow.bendings, broad.bendings, TwoCables::kBending, n));
+    CHECK(same_bits(narrow.bends, broad.bends, TwoCables::kBend, n));
+    baseline::bow(n, all, narrow.controls, narrow.bendings, adjoints, bow);
+    wide::bow(n, all, broad.controls, broad.bendings, adjoints, bows);
+    CHECK(same_bits(bow, bows, TwoCables::kBow, n));
+  }
+}
+
+#endif
+
+}  // namespace
+}  // namespace testing
+}  // namespace ccr
