@@ -47,7 +47,7 @@ def timed_step(solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndar
     """Step, with the time of the compiled call alone."""
     block, (first, second) = np.empty_like(start.block), cables.tolist()
     begin = time.perf_counter_ns()
-    status, iterations = solver._kernel.step(start.block, first, second, solver.robot.length_mm, block)
+    status, iterations, _ = solver._kernel.step(start.block, first, second, solver.robot.length_mm, block)
     elapsed = (time.perf_counter_ns() - begin) / 1e3
     end = SpatialEquilibrium(solver.robot, solver.scene, block, Status(status), iterations)
     return Timed(solver, start, cables, end, elapsed)

@@ -359,9 +359,9 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   const double limit = newton_.chain.robot().max_tension;
   if (rising && tension > limit) return Move::kOverTension;
   // The tension may rise above the limit on the way and sink again: by at most twice the mean of what it is above the
-  // straight line between its ends.
-  const double between = 2 * std::abs(lost(command)) * newton_.chain.stiffness() / (size * newton_.chain.robot().offset);
-  const bool peaks = pulled && std::max(tension, highest(tensions_)) + between > limit;
+  // straight line between its ends, which the cables worked more than that line tells.
+  const double hump = std::max(0.0, -lost(command)) * 2 * newton_.chain.stiffness() / (size * newton_.chain.robot().offset);
+  const bool peaks = pulled && std::max(tension, highest(tensions_)) + hump > limit;
   return peaks && size > kPeakStep ? Move::kRejected : Move::kAccepted;
 }
 
