@@ -5,32 +5,48 @@ import json
 import os
 import sys
 import time
+from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from soak.cases import find, shrink
 from soak.episodes import STEPS, Episode, play
 from soak.report import Tally, table
 from soak.scenes import MODELS
 
 SHARES = {"uniform": 0.4, "sliding": 0.4, "space": 0.2}
+KEPT = 10  # cases of a kind that are made small and kept
 
 
 def main():
     """Run, write the table and the cases, and end with 1 where anything was found."""
     options = _options()
+    if options.case:
+        sys.exit(_replay(*options.case))
     began = time.time()
     episodes = [
         Episode(model, options.seed, index)
         for model in options.models
         for index in range(-(-int(options.steps * _share(model, options.models)) // STEPS))
     ]
-    tallies, cases = {model: Tally() for model in options.models}, []
+    tallies, cases, kept = {model: Tally() for model in options.models}, [], Counter()
     with ProcessPoolExecutor(options.processes) as pool:
-        for episode, (tally, found) in zip(episodes, pool.map(play, episodes, chunksize=8), strict=True):
+        for episode, (tally, found) in zip(episodes, pool.map(play, episodes, chunksize=4), strict=True):
             tallies[episode.model].add(tally)
-            cases += found
+            for case in found:
+                kept[episode.model, case["kind"]] += 1
+                cases += [case] if kept[episode.model, case["kind"]] <= KEPT else []
+        cases = list(pool.map(shrink, cases))
     _write(options.out, tallies, cases, time.time() - began)
     sys.exit(bool(cases))
+
+
+def _replay(path, index):
+    """Play one case of a report again, and tell what it shows."""
+    case = json.loads(Path(path).read_text())[int(index)]
+    findings = find(case)
+    print(json.dumps(case, indent=1), *findings, sep="\n")
+    return not findings
 
 
 def _options():
@@ -40,6 +56,7 @@ def _options():
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("runs/soak"), help="folder of the report and the cases")
+    parser.add_argument("--case", nargs=2, metavar=("FILE", "INDEX"), help="play one case of cases.json again")
     return parser.parse_args()
 
 
@@ -55,8 +72,8 @@ def _write(folder, tallies, cases, seconds):
     (folder / "soak.md").write_text(text + "\n")
     (folder / "cases.json").write_text(json.dumps(cases, indent=1))
     print(text)
-    for case in cases[:20]:
-        print(case["kind"], case["value"], "episode", case["episode"], "step", case["step"], case["scene_kind"])
+    for model, tally in tallies.items():
+        print(f"{model}: {dict(tally.findings) or 'nothing found'}")
     print(f"{len(cases)} cases in {folder / 'cases.json'}; {seconds:.0f} s")
 
 

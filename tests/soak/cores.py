@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from solver import Robot
 from soak.shapes import depth, distance
+from solver import Robot
 
 DIRECTIONS, RINGS = 6, 16
 ZOOMS = 8
@@ -46,7 +46,7 @@ def _divided(lines, between):
 class CoreCheck:
     """Looks for swept cores of the obstacles of one scene.
 
-    Those that only some nodes meet have none, and what is outside of a wall before and after stays so on a straight way.
+    Those that only some nodes meet have none, and what is outside of a wall at both ends of a straight way stays so.
     """
 
     def __init__(self, scene):

@@ -19,6 +19,7 @@ class Tally:
     contact: int = 0
     statuses: Counter = field(default_factory=Counter)
     kinds: Counter = field(default_factory=Counter)
+    findings: Counter = field(default_factory=Counter)
     refused: int = 0
     least_gap: float = math.inf
     least_distance: float = math.inf

@@ -7,6 +7,7 @@ import numpy as np
 
 from solver import Capsule, Circle, Custom, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene, spatial
 
+DIRECTIONS = ("normal", "axis", "second")
 CABLE_POWERS = {
     "objective": 0,
     "nodes": None,  # places and, in the plane, angles
@@ -30,7 +31,11 @@ def scale_robot(robot, s):
 
     Custom shapes scale with their family: it must be one whose sizes are all lengths.
     """
-    lengths = {"length_mm": s * robot.length_mm, "offset_mm": s * robot.offset_mm, "max_cable_mm": s * robot.max_cable_mm}
+    lengths = {
+        "length_mm": s * robot.length_mm,
+        "offset_mm": s * robot.offset_mm,
+        "max_cable_mm": s * robot.max_cable_mm,
+    }
     if isinstance(robot, Robot):
         lengths["length_range_mm"] = times(robot.length_range_mm, s)
     return replace(robot, rigidity=s * s * robot.rigidity, **lengths)
@@ -44,7 +49,11 @@ def scale_scene(scene, s):
 def scale_obstacle(obstacle, s):
     """One obstacle s times as large and as far."""
     matrix = obstacle.stiffness and tuple(times(row, 1 / s) for row in obstacle.stiffness)
-    return replace(obstacle, stiffness=matrix, **_lengths(obstacle, s))
+    scaled = replace(obstacle, stiffness=matrix, **_lengths(obstacle, s))
+    for direction in DIRECTIONS:  # normalised once more on construction, which may change their last bits
+        if hasattr(obstacle, direction):
+            object.__setattr__(scaled, direction, getattr(obstacle, direction))
+    return scaled
 
 
 @singledispatch

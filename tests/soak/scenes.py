@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver, spatial
-from solver.robot import LINES
-from solver.spatial import SpatialRobot, SpatialSolver
 from soak.cores import line_points
 from soak.scale import scale_robot, scale_scene
 from soak.shapes import distance
+from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver, spatial
+from solver.robot import LINES
+from solver.spatial import SpatialRobot, SpatialSolver
 
 MODELS = ("uniform", "sliding", "space")
 SCALES = (0.1, 1.0, 1.0, 1.0, 10.0)
@@ -142,7 +142,9 @@ def _planar_shape(generator, robot, thinnest, spring):
         case 3:
             return _polygon(generator, center, along + 2, across / 2, spring)
         case 4:
-            return Custom(family=OVAL, sizes=(across + 1, along + 1), axis=tuple(axis), reach=2.5 * (across + along), **place)
+            return Custom(
+                family=OVAL, sizes=(across + 1, along + 1), axis=tuple(axis), reach=2.5 * (across + along), **place
+            )
         case _:
             return HalfPlane(point=tuple(center), normal=(-1, generator.uniform(-1, 1)), stiffness=spring)
 
@@ -240,9 +242,7 @@ def springs(generator, robot):
     )
 
 
-PLANAR_KINDS = {
-    sampler.__name__: sampler for sampler in (circles, shapes, crowd, narrow, channel, sharp, springs)
-}
+PLANAR_KINDS = {sampler.__name__: sampler for sampler in (circles, shapes, crowd, narrow, channel, sharp, springs)}
 
 
 # Space.
@@ -302,7 +302,9 @@ def spatial_crowd(generator, robot):
     """Six to thirty-two small balls all around."""
 
     def sample():
-        return spatial.Sphere(center=tuple(_around(generator, 12, 90)), radius=_width(robot) * generator.uniform(1, 1.8))
+        return spatial.Sphere(
+            center=tuple(_around(generator, 12, 90)), radius=_width(robot) * generator.uniform(1, 1.8)
+        )
 
     return _clear(generator, robot, sample, int(generator.integers(6, 33)))
 
