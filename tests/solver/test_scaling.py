@@ -40,7 +40,7 @@ def test_powers_of_two_give_the_same_bits(model, s, episodes):
     for index in episodes:
         solver, taken = episode(model, index)
         for k, (state, large) in enumerate(zip(taken.states, scaled(solver, taken.commands, s), strict=True)):
-            assert large.status is state.status, (index, k)
+            assert large.status.name == state.status.name, (index, k)
             expected = natural(state)
             for name, value in natural(large, s).items():
                 np.testing.assert_array_equal(value, expected[name], f"{name}, episode {index}, step {k}")
@@ -53,7 +53,7 @@ def test_other_scales_give_the_same_robot(model, s, episodes):
         solver, taken = episode(model, index)
         length = solver.robot.length_mm
         for k, (state, large) in enumerate(zip(taken.states, scaled(solver, taken.commands, s), strict=True)):
-            assert large.status is state.status, (index, k)
+            assert large.status.name == state.status.name, (index, k)
             expected, found = natural(state), natural(large, s)
             for name, unit in (("places", length), ("forces", 1.0), ("tension", 1.0), ("tensions", 1.0)):
                 if name in found:
