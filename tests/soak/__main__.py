@@ -10,11 +10,12 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from soak.cases import find, shrink
-from soak.episodes import STEPS, Episode, play
+from soak.episodes import Episode, play
 from soak.report import Tally, table
 from soak.scenes import MODELS
 
 SHARES = {"uniform": 0.4, "sliding": 0.4, "space": 0.2}
+STEPS = 500  # of an episode
 KEPT = 10  # cases of a kind that are made small and kept
 
 
@@ -25,7 +26,7 @@ def main():
         sys.exit(_replay(*options.case))
     began = time.time()
     episodes = [
-        Episode(model, options.seed, index)
+        Episode(model, options.seed, index, STEPS)
         for model in options.models
         for index in range(-(-int(options.steps * _share(model, options.models)) // STEPS))
     ]

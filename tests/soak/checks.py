@@ -11,13 +11,13 @@ from soak.shapes import distance
 from soak.walks import command_of, step
 from solver import Robot, Status
 
-BLOCKED, GAVE_UP = Status(3), Status(4)
-FAR = 0.5  # of the spacing: a step that moves a point farther is looked at from one accepted shape to the next
+FAR = 0.5  # of the shortest edge: a step that moves a point farther is looked at from one accepted shape to the next
 CERTIFY_EVERY = 1000
-MOST_FACTORISATIONS = 5000
+MOST_FACTORIZATIONS = 5000
 MOST_BLOCKED = 3  # blocked steps of an episode that are tried another way
 DEEPEST = 1e-12  # of the robot's length
 INSIDE = 1e-11  # the same by the distances in numpy, which round differently
+ROUNDOFF = 1e-12
 BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
@@ -46,19 +46,21 @@ def _states(solver, taken, tally):
     finite = np.array([np.isfinite(state.block[~np.isposinf(state.block)]).all() for state in states])
     least = np.array([state.gaps.min(initial=math.inf) for state in states]) / length
     inside = _least_distance(solver, states) / length
+    edges = np.linalg.norm(np.diff(_points(states), axis=2), axis=-1).max(axis=2) / robot.edges_mm
     tension = np.array([np.max(_tensions(state)) for state in states]) / robot.max_tension
-    work = np.array([getattr(state, "factorisations", state.iterations) for state in states])
-    gave_up = np.array([state.status == GAVE_UP for state in states])
+    work = np.array([state.factorizations for state in states])
+    gave_up = np.array([state.status == Status.GAVE_UP for state in states])
     tally.least_gap = min(tally.least_gap, least.min(initial=math.inf))
     tally.least_distance = min(tally.least_distance, inside.min(initial=math.inf))
     tally.most_tension = max(tally.most_tension, tension.max())
-    tally.most_factorisations = max(tally.most_factorisations, int(work.max()))
+    tally.most_factorizations = max(tally.most_factorizations, int(work.max()))
     return [
         *_first("not finite", ~finite, least),
         *_first("gap", least < -DEEPEST, least),
         *_first("penetration", inside < -INSIDE, inside),
+        *_first("edge", edges.max(axis=1) > 1 + ROUNDOFF, edges.max(axis=1)),
         *_first("tension", tension > 1 + BAND, tension),
-        *_first("factorisations", work > MOST_FACTORISATIONS, work),
+        *_first("factorizations", work > MOST_FACTORIZATIONS, work),
         *_first("gave up", gave_up, work),
     ]
 
@@ -97,11 +99,10 @@ def _optimality(solver, taken, tally, offset):
     """The kernel's own measure of every state, and the node-coordinate certificate of events and now and then."""
     findings, certified = [], 0
     for k, (before, state) in enumerate(pairwise(taken.states)):
-        if hasattr(solver, "optimality"):
-            worst = float(np.max(solver.optimality(state)))
-            tally.worst_optimality = max(tally.worst_optimality, worst)
-            if not worst <= OPTIMAL:
-                findings.append(Finding("optimality", k, worst))
+        worst = float(np.max(solver.optimality(state)))
+        tally.worst_optimality = max(tally.worst_optimality, worst)
+        if not worst <= OPTIMAL:
+            findings.append(Finding("optimality", k, worst))
         event = state.status != Status.CONVERGED and not np.array_equal(before.block, state.block)
         tally.events += event
         if (event and certified < tally.certificates_each) or (offset + k) % CERTIFY_EVERY == 0:
@@ -128,14 +129,14 @@ def certificate(state):
 
 def _blocked(solver, taken, tally):
     """Blocked steps, and whether another way gets on from there."""
-    blocked = np.flatnonzero([state.status == BLOCKED for state in taken.states[1:]])
+    blocked = np.flatnonzero([state.status == Status.BLOCKED for state in taken.states[1:]])
     tally.blocked += len(blocked)
     findings = []
     for k in blocked[:MOST_BLOCKED].tolist():
         passed = _other_ways(solver, taken, k)
         tally.blocked_unconfirmed += passed
         kind = "blocked, but not another way" if passed else "blocked"
-        findings.append(Finding(kind, k, taken.states[k + 1].iterations))
+        findings.append(Finding(kind, k, taken.states[k + 1].factorizations))
     return findings
 
 
@@ -153,12 +154,12 @@ def _other_ways(solver, taken, k):
 def _passes(solver, state, commands):
     for command in commands:
         state = step(solver, state, command)
-    return state.status != BLOCKED and state.status != GAVE_UP
+    return state.status < Status.BLOCKED
 
 
 def _cores(solver, taken, tally):
     """Cores swept from state to state where all moves are small, else from one accepted shape to the next."""
-    core, states = CoreCheck(solver.scene), taken.states
+    core, states = CoreCheck(solver.robot, solver.scene), taken.states
     if not core.obstacles:
         return []
     points, moved = _points(states), _displacements(states)
@@ -166,7 +167,7 @@ def _cores(solver, taken, tally):
     motion = np.maximum(motion, np.linalg.norm(np.diff(moved, axis=0), axis=-1).max(axis=1, initial=0))
     snapped = np.array([state.status == Status.SNAPPED for state in states[1:]], bool)
     swept = core.swept(points, moved)
-    looked = snapped | (motion > FAR * solver.robot.spacing_mm) | swept.any(axis=1)
+    looked = snapped | (motion > FAR * min(solver.robot.edges_mm)) | swept.any(axis=1)
     tally.traced += int(looked.sum())
     findings = []
     for steps in _chunks(np.flatnonzero(looked)):
@@ -189,14 +190,9 @@ def _traced(solver, core, taken, steps):
 
 
 def accepted(solver, state, command):
-    """Points and displacements of obstacles of all shapes accepted on the way of a step, the first and last included.
-
-    A trace tells the nodes only: in space the lines off the backbone are not looked at in between, and neither are
-    obstacles on springs.
-    """
-    target = float(command[0]) if isinstance(solver.robot, Robot) else command[:2]
-    length = (float(command[1]),) if isinstance(solver.robot, Robot) else ()
-    nodes = solver.trace(state, target, *length)
-    moved = np.zeros((len(nodes), *state.displacements.shape))
-    moved[:, list(solver.scene.mounted)] = math.nan
-    return line_points(solver.robot, nodes), moved
+    """Points, and displacements of obstacles, of all shapes accepted on the way of a step, with the first and last."""
+    if isinstance(solver.robot, Robot):
+        trace = solver.trace(state, float(command[0]), float(command[1]))
+    else:
+        trace = solver.trace(state, command[:2])
+    return trace.points, trace.displacements

@@ -1,8 +1,9 @@
 """Whether an edge between neighbouring points that can touch swept over the core of an obstacle.
 
-The core of an obstacle, seen from a line of such points, is what lies deeper in it than half of the longest edge of
-that line: a robot whose points stay outside and move continuously never gets there. Between two accepted shapes all
-points move straight. Obstacles on springs are looked at where they stand: points are counted from their displacement.
+The core of an obstacle, seen from a line of such points, is what lies deeper in it than half of the longest edge that
+the line can have: a robot whose points stay outside and move continuously never gets there. Between two accepted shapes
+all points move straight. Obstacles on springs are looked at where they stand: points are counted from their
+displacement.
 """
 
 import math
@@ -23,13 +24,11 @@ def line_points(robot, nodes, frames=None):
     Args:
         robot: The robot.
         nodes: Poses ``(k, n+1, 3)`` in the plane; places in space.
-        frames: Of the disks in space, ``(k, n+1, 3, 3)``; without them only the backbone is known.
+        frames: Of the disks in space, ``(k, n+1, 3, 3)``.
     """
     if isinstance(robot, Robot):
         levers = np.stack([np.cos(nodes[..., 2]), np.sin(nodes[..., 2])], axis=-1)
         lines = nodes[:, None, :, :2] + np.array(robot.lines_mm)[:, None, None] * levers[:, None]
-    elif frames is None:
-        lines = nodes[:, None]
     else:
         lines = nodes[:, None] + np.einsum("knij,pj->kpni", frames[..., :2], robot.lines_mm)
     return _divided(lines, robot.between)
@@ -49,7 +48,8 @@ class CoreCheck:
     Those that only some nodes meet have none, and what is outside of a wall at both ends of a straight way stays so.
     """
 
-    def __init__(self, scene):
+    def __init__(self, robot, scene):
+        self.edges = robot.edges_mm
         cored = [obstacle.nodes is None and math.isfinite(obstacle.extent.radius) for obstacle in scene]
         self.obstacles = [(j, obstacle) for j, obstacle in enumerate(scene) if cored[j]]
         self.planar = not scene.obstacles or scene.obstacles[0].space == 2
@@ -60,16 +60,12 @@ class CoreCheck:
 
         Args:
             points: The points that can touch, ``(k, p, positions, d)`` [mm].
-            displacements: Of the obstacles, ``(k, m, d)`` [mm]; NaN for those not to be looked at.
+            displacements: Of the obstacles, ``(k, m, d)`` [mm].
             linked: Which pairs of neighbouring shapes follow one another, ``(k-1,)`` bool.
         """
         swept = np.zeros((len(points) - 1, displacements.shape[1]), bool)
-        edges = np.linalg.norm(np.diff(points, axis=2), axis=-1).max(axis=(0, 2))
-        known = np.isfinite(displacements).all(axis=(0, 2))
-        for line, longest in enumerate(edges):
+        for line, longest in enumerate(self.edges):
             for j, obstacle in self.obstacles:
-                if not known[j]:
-                    continue
                 seen = points[:, line] - displacements[:, None, j]
                 close = linked & _close(obstacle, seen, longest)
                 if close.any():

@@ -28,14 +28,14 @@ class Tally:
     worst_certificate: float = 0.0
     certified: int = 0
     events: int = 0
-    most_factorisations: int = 0
+    most_factorizations: int = 0
     traced: int = 0
     cores_swept: int = 0
     blocked: int = 0
     blocked_unconfirmed: int = 0
     certificates_each: int = 1000
 
-    LARGEST = ("most_tension", "worst_optimality", "worst_certificate", "most_factorisations", "certificates_each")
+    LARGEST = ("most_tension", "worst_optimality", "worst_certificate", "most_factorizations", "certificates_each")
 
     @classmethod
     def of(cls, model, setting, walk):
@@ -75,7 +75,7 @@ ROWS = {
     "worst certificate": lambda t: f"{t.worst_certificate:.1e}",
     "certified / events": lambda t: f"{t.certified:,} / {t.events:,}",
     "blocked, not another way": lambda t: f"{t.blocked_unconfirmed} of {t.blocked}",
-    "largest work of a step": lambda t: f"{t.most_factorisations:,}",
+    "largest work of a step": lambda t: f"{t.most_factorizations:,}",
     "scenes refused": lambda t: f"{t.refused:,}",
 }
 

@@ -120,8 +120,8 @@ def _ahead(generator, low=20.0, high=80.0):
 
 
 def _width(robot):
-    """Half-width of an obstacle that surely has a core."""
-    return 0.66 * robot.spacing_mm
+    """Inner radius of an obstacle that surely has a core."""
+    return 0.66 * max(robot.edges_mm)
 
 
 # The plane.
@@ -191,7 +191,7 @@ def narrow(generator, robot):
     """Circles and capsules that are hardly wider than the points are apart, close to the robot."""
 
     def sample():
-        radius = robot.spacing_mm * generator.uniform(0.5, 0.65)
+        radius = max(robot.edges_mm) * generator.uniform(0.5, 0.65)
         if generator.random() < 0.8:
             return Circle(center=tuple(_ahead(generator, 14, 50)), radius=radius)
         start, way = _ahead(generator, 14, 50), generator.uniform(1, 20) * _unit(generator, 2)
@@ -313,7 +313,7 @@ def spatial_narrow(generator, robot):
     """Balls that are hardly wider than the points are apart, close to the robot."""
 
     def sample():
-        radius = robot.spacing_mm * generator.uniform(0.5, 0.65)
+        radius = max(robot.edges_mm) * generator.uniform(0.5, 0.65)
         return spatial.Sphere(center=tuple(_around(generator, 16, 45)), radius=radius)
 
     return _clear(generator, robot, sample, int(generator.integers(1, 7)))

@@ -67,12 +67,17 @@ def triangle(radius):
         return None
 
 
+def trace(solver):
+    """Shapes accepted on the way of a step from rest to 12 mm."""
+    return solver.trace(solver.rest(), 12.0).nodes
+
+
 def test_a_sharp_corner_costs_no_more_than_a_round_one():
     solvers = [triangle(10.0**-power) for power in range(1, 16)]
     assert None in solvers
     round_one, sharp_one = solvers[0], solvers[solvers.index(None) - 1]
     assert sharp_one.step(sharp_one.rest(), 12.0).status is Status.CONVERGED
-    assert len(sharp_one.trace(sharp_one.rest(), 12.0)) <= 3 * len(round_one.trace(round_one.rest(), 12.0))
+    assert len(trace(sharp_one)) <= 3 * len(trace(round_one))
     assert cost(sharp_one, 12.0) <= 3 * cost(round_one, 12.0)
 
 

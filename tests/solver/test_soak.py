@@ -10,6 +10,7 @@ from solver import Capsule, Circle, Robot, Scene, Solver
 from solver.robot import CABLES
 
 SHORT = 3000
+ROBOT = Robot.prototype()
 
 
 @pytest.mark.parametrize("cable", CABLES)
@@ -57,17 +58,17 @@ def test_a_robot_moved_over_an_obstacle_sweeps_its_core(obstacle):
     over = np.linspace((0, 0), (60, 0), 16)[:, None]
     points = (line + over)[:, None]
     still = np.zeros((16, 1, 2))
-    swept = CoreCheck(Scene([obstacle])).swept(points, still)
+    swept = CoreCheck(ROBOT, Scene([obstacle])).swept(points, still)
     assert swept.any()
     assert not swept[:10].all()
     with_it = over * [1.0, 0.0]
-    assert not CoreCheck(Scene([obstacle])).swept(points, with_it).any()
+    assert not CoreCheck(ROBOT, Scene([obstacle])).swept(points, with_it).any()
 
 
 def test_the_check_sees_the_one_step_that_passed_a_circle():
     """The end that a step of 11.3 mm came to when both neighbours of an edge passed a circle of 1.05 × the spacing."""
-    robot, circle = Robot.prototype(), Circle(center=(30.6, 160.8), radius=5.25)
-    free = Solver(robot, Scene())
+    circle = Circle(center=(30.6, 160.8), radius=5.25)
+    free = Solver(ROBOT, Scene())
     states = [free.step(free.rest(), cable) for cable in np.linspace(0.01, 11.3, 200)]
     points = np.stack([state.points for state in states])
-    assert CoreCheck(Scene([circle])).swept(points, np.zeros((200, 1, 2))).any()
+    assert CoreCheck(ROBOT, Scene([circle])).swept(points, np.zeros((200, 1, 2))).any()

@@ -1,5 +1,7 @@
 """Random walks in space among ordinary and adversarial obstacles; ``python -m soak`` is the long form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from soak.cores import CoreCheck
@@ -7,9 +9,10 @@ from soak.episodes import STEPS, Episode, play
 from soak.report import Tally
 
 from solver import Scene
-from solver.spatial import Box, Capsule, Cylinder, Sphere
+from solver.spatial import Box, Capsule, Cylinder, SpatialRobot, Sphere
 
 SHORT = 2000
+ROBOT = replace(SpatialRobot.prototype(), touch=("backbone",))
 
 
 def test_nothing_is_found_in_random_episodes():
@@ -38,7 +41,7 @@ def test_a_line_moved_over_an_obstacle_sweeps_its_core(obstacle):
     line = np.linspace((0, 0.1, 5), (0, 0.1, 185), 19)
     over = np.linspace((0, 0, 0), (60, 0, 0), 16)[:, None]
     still, beside = np.zeros((16, 1, 3)), np.array([0.0, 60.0, 0.0])
-    check = CoreCheck(Scene([obstacle]))
+    check = CoreCheck(ROBOT, Scene([obstacle]))
     assert check.swept((line + over)[:, None], still).any()
     assert not check.swept((line + over + beside)[:, None], still).any()
     assert not check.swept((line + over)[:, None], over).any()
