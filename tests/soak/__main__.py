@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import random
 import sys
 import time
 from collections import Counter
@@ -16,7 +17,38 @@ from soak.scenes import MODELS
 
 SHARES = {"uniform": 0.4, "sliding": 0.4, "space": 0.2}
 STEPS = 500  # of an episode
+REPORTS = 20  # on the way
 KEPT = 10  # cases of a kind that are made small and kept
+
+
+class Report:
+    """What has been found so far, in a folder."""
+
+    def __init__(self, folder, models):
+        self.folder, self.began = folder, time.time()
+        self.tallies, self.cases, self.kept = {model: Tally() for model in models}, [], Counter()
+
+    def add(self, model, tally, found):
+        """Add an episode; of each kind of finding only some cases are kept."""
+        self.tallies[model].add(tally)
+        for case in found:
+            self.kept[model, case["kind"]] += 1
+            if self.kept[model, case["kind"]] <= KEPT:
+                self.cases.append(case)
+
+    def write(self):
+        """Write ``soak.json``, ``soak.md`` and ``cases.json``."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        tallies = {model: tally.as_dict() for model, tally in self.tallies.items()}
+        report = {"seconds": time.time() - self.began, "tallies": tallies}
+        (self.folder / "soak.json").write_text(json.dumps(report, indent=1))
+        (self.folder / "soak.md").write_text(table(self.tallies) + "\n")
+        (self.folder / "cases.json").write_text(json.dumps(self.cases, indent=1))
+
+    def __str__(self):
+        found = "\n".join(f"{model}: {dict(t.findings) or 'nothing found'}" for model, t in self.tallies.items())
+        cases = f"cases are in {self.folder / 'cases.json'}; play one again with --case FILE INDEX"
+        return f"{table(self.tallies)}\n{found}\n{cases}\n{time.time() - self.began:.0f} s"
 
 
 def main():
@@ -24,22 +56,29 @@ def main():
     options = _options()
     if options.case:
         sys.exit(_replay(*options.case))
-    began = time.time()
-    episodes = [
-        Episode(model, options.seed, index, STEPS)
-        for model in options.models
-        for index in range(-(-int(options.steps * _share(model, options.models)) // STEPS))
-    ]
-    tallies, cases, kept = {model: Tally() for model in options.models}, [], Counter()
+    report, episodes = Report(options.out, options.models), _episodes(options)
     with ProcessPoolExecutor(options.processes) as pool:
-        for episode, (tally, found) in zip(episodes, pool.map(play, episodes, chunksize=4), strict=True):
-            tallies[episode.model].add(tally)
-            for case in found:
-                kept[episode.model, case["kind"]] += 1
-                cases += [case] if kept[episode.model, case["kind"]] <= KEPT else []
-        cases = list(pool.map(shrink, cases))
-    _write(options.out, tallies, cases, time.time() - began)
-    sys.exit(bool(cases))
+        played = zip(episodes, pool.map(play, episodes, chunksize=4), strict=True)
+        for count, (episode, (tally, found)) in enumerate(played, 1):
+            report.add(episode.model, tally, found)
+            if count % (-(-len(episodes) // REPORTS)) == 0:
+                print(
+                    f"{count / len(episodes):.0%}: {dict(report.kept) or 'nothing found'}", file=sys.stderr, flush=True
+                )
+                report.write()
+        report.cases = list(pool.map(shrink, report.cases))
+    report.write()
+    print(report)
+    sys.exit(bool(report.cases))
+
+
+def _episodes(options):
+    """All episodes, shuffled, so that a part of them tells of all models."""
+    total = sum(SHARES[model] for model in options.models)
+    counts = {model: -(-int(options.steps * SHARES[model] / total) // STEPS) for model in options.models}
+    episodes = [Episode(model, options.seed, k, STEPS) for model, count in counts.items() for k in range(count)]
+    random.Random(options.seed).shuffle(episodes)
+    return episodes
 
 
 def _replay(path, index):
@@ -59,23 +98,6 @@ def _options():
     parser.add_argument("--out", type=Path, default=Path("runs/soak"), help="folder of the report and the cases")
     parser.add_argument("--case", nargs=2, metavar=("FILE", "INDEX"), help="play one case of cases.json again")
     return parser.parse_args()
-
-
-def _share(model, models):
-    return SHARES[model] / sum(SHARES[name] for name in models)
-
-
-def _write(folder, tallies, cases, seconds):
-    folder.mkdir(parents=True, exist_ok=True)
-    text = table(tallies)
-    report = {"seconds": seconds, "tallies": {name: tally.as_dict() for name, tally in tallies.items()}}
-    (folder / "soak.json").write_text(json.dumps(report, indent=1))
-    (folder / "soak.md").write_text(text + "\n")
-    (folder / "cases.json").write_text(json.dumps(cases, indent=1))
-    print(text)
-    for model, tally in tallies.items():
-        print(f"{model}: {dict(tally.findings) or 'nothing found'}")
-    print(f"{len(cases)} cases in {folder / 'cases.json'}; {seconds:.0f} s")
 
 
 if __name__ == "__main__":

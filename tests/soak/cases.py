@@ -1,5 +1,6 @@
 """Cases to reproduce what a soak found: as JSON, made small, and replayed."""
 
+import time
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from soak.scenes import make_solver
 from soak.walks import replay
 from solver import Scene, spatial
 
-TRIALS = 80
+SECONDS = 15  # of processor time to make a case small
 
 
 def load(case: dict[str, Any]):
@@ -31,20 +32,22 @@ def find(case):
 
 
 def shrink(case):
-    """The same case with fewer obstacles and commands, as far as some trials get."""
-    trials = iter(range(TRIALS))
-    case = _without(case, "scene", trials, chunk=1)
+    """The same case with fewer obstacles and commands, as far as some seconds allow."""
+    if "commands" not in case:  # an episode that raised an error
+        return case
+    end = time.process_time() + SECONDS
+    case = _without(case, "scene", end, chunk=1)
     chunk = len(case["commands"]) // 2
     while chunk:
-        case = _without(case, "commands", trials, chunk)
+        case = _without(case, "commands", end, chunk)
         chunk //= 2
     return case | {"step": len(case["commands"]) - 1}
 
 
-def _without(case, name, trials, chunk):
+def _without(case, name, end, chunk):
     """Leave out what of a list the case does not need, so many entries at a time."""
     k = 0
-    while k < len(case[name]) and next(trials, None) is not None:
+    while k < len(case[name]) and time.process_time() < end:
         smaller = case | {name: case[name][:k] + case[name][k + chunk :]}
         if _shows(smaller, case["kind"]):
             case = smaller

@@ -31,7 +31,10 @@ def play(episode):
     """Play an episode; its tally, and the cases to reproduce what was found."""
     setting, generator = setting_of(episode)
     solver = setting.solver
-    taken = walk(solver, sample_increments(generator, solver, setting.scale, episode.steps))
+    try:
+        taken = walk(solver, sample_increments(generator, solver, setting.scale, episode.steps))
+    except Exception as error:  # no step in range may raise one
+        return Tally(), [{"kind": f"raised {type(error).__name__}", "error": str(error), "episode": list(episode)}]
     tally = Tally.of(episode.model, setting, taken)
     found = check(solver, taken, tally, episode.index * episode.steps)
     return tally, [_case(episode, setting, taken, finding) for finding in found]

@@ -7,6 +7,7 @@ import numpy as np
 
 from solver import Capsule, Circle, Custom, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene, spatial
 
+VANISHING = 1e-290  # smaller numbers have fewer bits, which do not scale
 DIRECTIONS = ("normal", "axis", "second")
 CABLE_POWERS = {
     "objective": 0,
@@ -109,11 +110,13 @@ def _(obstacle: spatial.Box, s):
 def natural(equilibrium, s=1.0):
     """The numbers of an equilibrium of a robot scaled by s, as those of the robot at s = 1, by name.
 
-    With s a power of two the division is exact, so that the law holds to the last bit.
+    With s a power of two the division is exact, so that the law holds to the last bit of every number that does not
+    vanish.
     """
     planar = isinstance(equilibrium.robot, Robot)
     powers = PLANAR_POWERS if planar else SPATIAL_POWERS
     values = {name: np.asarray(getattr(equilibrium, name)) for name in powers}
     nodes = values.pop("nodes")
     numbers = {name: value / s ** powers[name] for name, value in values.items()}
-    return numbers | ({"places": nodes[:, :2] / s, "angles": nodes[:, 2]} if planar else {"places": nodes / s})
+    numbers |= {"places": nodes[:, :2] / s, "angles": nodes[:, 2]} if planar else {"places": nodes / s}
+    return {name: np.where(np.abs(value) < VANISHING, 0.0, value) for name, value in numbers.items()}
