@@ -94,8 +94,8 @@ STATUS_COLORS: dict[Status, Color] = {
     Status.CONVERGED: PALETTE.force_true,
     Status.SNAPPED: PALETTE.desired,
     Status.STALLED: PALETTE.force_est,
-    Status.JAMMED: PALETTE.force_est,
-    Status.FAILED: PALETTE.contact,
+    Status.BLOCKED: PALETTE.force_est,
+    Status.GAVE_UP: PALETTE.contact,
 }
 
 

@@ -1,7 +1,7 @@
 """Exact optimisation kinematics of a cable-driven continuum robot among obstacles."""
 
 from solver.custom import Custom, Family
-from solver.equilibrium import Equilibrium, Residuals
+from solver.equilibrium import Equilibrium, Optimality, Residuals
 from solver.obstacles import Capsule, Circle, Ellipse, HalfPlane, Obstacle, Polygon
 from solver.reference import ReferenceSolver
 from solver.robot import Robot
@@ -18,6 +18,7 @@ __all__ = [
     "Family",
     "HalfPlane",
     "Obstacle",
+    "Optimality",
     "Polygon",
     "ReferenceSolver",
     "Residuals",

@@ -13,7 +13,7 @@ from solver.layout import CABLE, PLANE, Layout, Model, layout
 from solver.reference import ReferenceSolver
 from solver.robot import Robot
 from solver.scene import Scene
-from solver.solve import check_width, kernel_robot, kernel_scene
+from solver.solve import check_core, kernel_robot, kernel_scene
 from solver.status import Status
 
 
@@ -26,6 +26,7 @@ class BaseBatch(ABC):
         blocks: Equilibria, ``(N, size)``; :attr:`layout` tells where their numbers stand.
         statuses: How the last step of each ended, values of :class:`solver.Status`, ``(N,)``.
         iterations: Newton iterations of these steps, ``(N,)``.
+        factorizations: Factorisations of the Hessian in these steps, ``(N,)``.
         commands: Cable displacements and length each is moved to, ``(N, cables + 1)`` [mm].
 
     Args:
@@ -49,6 +50,7 @@ class BaseBatch(ABC):
         self.blocks = np.zeros((count, self.layout.size))
         self.statuses = np.zeros(count, np.int64)
         self.iterations = np.zeros(count, np.int64)
+        self.factorizations = np.zeros(count, np.int64)
         self._scenes: list[Scene | None] = [None] * count
         self.commands = np.zeros((count, self.model.cables + 1))
         self._fleet = self._make_fleet(obstacles, threads)
@@ -67,7 +69,7 @@ class BaseBatch(ABC):
         """Obstacles as the kernel takes them."""
 
     @abstractmethod
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, iterations: int) -> BaseEquilibrium:
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> BaseEquilibrium:
         """The result of a solve."""
 
     def assign(self, index: int, scene: Scene) -> None:
@@ -76,7 +78,7 @@ class BaseBatch(ABC):
         Raises:
             ValueError: If an obstacle is narrow enough to slip between its points or names a node it does not have.
         """
-        check_width(self.robot, scene)
+        check_core(self.robot, scene)
         self._fleet.assign(index, self._kernel_scene(scene))
         self._scenes[index] = scene
 
@@ -116,9 +118,15 @@ class BaseBatch(ABC):
         Args:
             commands: As :attr:`commands`, in range.
         """
-        blocks, statuses, iterations = self.blocks.copy(), self.statuses.copy(), self.iterations.copy()
-        self._fleet.step(self._all, commands, blocks, statuses, iterations)
+        blocks, scratch = self.blocks.copy(), [np.zeros(self.count, np.int64) for _ in range(3)]
+        self._fleet.step(self._all, commands, blocks, *scratch)
         return blocks
+
+    def optimality(self) -> np.ndarray:
+        """How well the present equilibria meet their conditions, rows as :class:`solver.Optimality`, ``(N, 3)``."""
+        found = np.zeros((self.count, 3))
+        self._fleet.optimality(self.blocks, found)
+        return found
 
     def reaches(
         self,
@@ -166,11 +174,11 @@ class BaseBatch(ABC):
     def equilibrium(self, index: int) -> Any:
         """A robot's present equilibrium, on its own."""
         scene = self.scene(index)
-        status, iterations = Status(self.statuses[index]), int(self.iterations[index])
-        return self._make_equilibrium(scene, self.blocks[index].copy(), status, iterations)
+        work = int(self.iterations[index]), int(self.factorizations[index])
+        return self._make_equilibrium(scene, self.blocks[index].copy(), Status(self.statuses[index]), *work)
 
     def _move(self, robots: list[int]) -> None:
-        self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations)
+        self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
 
 
 class BatchSolver(BaseBatch):
@@ -187,8 +195,8 @@ class BatchSolver(BaseBatch):
     def _kernel_scene(self, scene: Scene) -> _kernel.Scene:
         return kernel_scene(self.robot, scene)
 
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, iterations: int) -> Equilibrium:
-        return Equilibrium(self.robot, scene, block, status, iterations)
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> Equilibrium:
+        return Equilibrium(self.robot, scene, block, status, *work)
 
 
 class ReferenceBatch(BatchSolver):

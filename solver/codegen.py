@@ -13,7 +13,14 @@ for name, place in (
     sys.modules[name] = package = ModuleType(name)
     package.__path__ = [str(Path(__file__).parent / place)]
 
-from solver.formulation import GAP_LAWS, arc_function, clearance_function, gap_function, segment_function  # noqa: E402
+from solver.formulation import (  # noqa: E402
+    GAP_LAWS,
+    arc_function,
+    clearance_function,
+    disk_gap_function,
+    gap_function,
+    segment_function,
+)
 from solver.spatial import formulation as spatial  # noqa: E402
 
 
@@ -29,5 +36,6 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1])
     in_space = [spatial.closure_function(), spatial.bend_function(), spatial.bow_function()]
     generate("segment_laws", [segment_function(), arc_function(), *in_space], folder)
+    generate("disk_laws", [disk_gap_function()], folder)
     kinds = (*GAP_LAWS, *spatial.GAP_LAWS)
     generate("gap_laws", [function(law) for law in kinds for function in (gap_function, clearance_function)], folder)

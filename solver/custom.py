@@ -15,6 +15,7 @@ from solver.robot import require_positive
 
 PLACE_SIZE = 5  # numbers of a shape before its sizes: centre, axis, growth
 BISECTIONS = 60
+RAY_POINTS = 33  # on each ray from the centre, where the largest disc inside is looked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +108,13 @@ class Custom(Obstacle):
 
     @property
     def extent(self) -> Extent:
-        """The disc of the reach; width and curvature as measured on the outline."""
+        """The disc of the reach; the largest disc inside and the curvature as measured on the outline."""
         return _extent(self)
+
+    @property
+    def surface(self) -> np.ndarray:
+        """Points of its surface, ``(k, 2)`` [mm]."""
+        return self.outline()
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The same shape elsewhere."""
@@ -142,7 +148,9 @@ class Custom(Obstacle):
 @lru_cache(maxsize=256)
 def _extent(shape: Custom) -> Extent:
     outline = shape.outline()
-    width = np.ptp(outline @ directions().T, axis=0).min()
+    shares = np.linspace(0, 1, RAY_POINTS)[:, None, None]
+    inside = (shape.center + shares * (outline - shape.center)).reshape(-1, 2)
+    inradius = np.linalg.norm(inside[:, None] - outline, axis=2).min(axis=1).max()
     _, x, y, xx, xy, yy = shape._derivatives(outline).T
     curvature = np.abs(xx * y**2 - 2 * xy * x * y + yy * x**2).max()
-    return Extent(shape.center, shape.reach, float(width), float(min(1 / curvature, shape.reach)))
+    return Extent(shape.center, shape.reach, float(inradius), float(min(1 / curvature, shape.reach)))

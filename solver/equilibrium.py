@@ -15,6 +15,20 @@ from solver.scene import Scene
 from solver.status import Status
 
 
+class Optimality(NamedTuple):
+    """Optimality of an equilibrium in the coordinates of the solver, without units, each zero at an exact solution.
+
+    Attributes:
+        stationarity: Largest slope of the Lagrangian in a coordinate of a segment [rad²].
+        gap: Deepest penetration, or what an active gap is open, over the robot's longest length.
+        complementarity: Largest product of a multiplier and its gap [rad²].
+    """
+
+    stationarity: float
+    gap: float
+    complementarity: float
+
+
 class Residuals(NamedTuple):
     """Optimality of an equilibrium in the paper's node coordinates (eq. 5 or 13), each zero at an exact solution.
 
@@ -48,6 +62,7 @@ class BaseEquilibrium(ABC):
             from which the search for the next one starts.
         status: How the step that led here ended.
         iterations: Newton iterations of that step.
+        factorizations: Factorisations of the Hessian in that step.
     """
 
     robot: Any
@@ -55,6 +70,7 @@ class BaseEquilibrium(ABC):
     block: np.ndarray
     status: Status
     iterations: int
+    factorizations: int = 0
 
     def __post_init__(self) -> None:
         self.block.flags.writeable = False
@@ -231,7 +247,20 @@ class Equilibrium(BaseEquilibrium):
     def pushes(self) -> np.ndarray:
         """Multipliers of the inequalities of :func:`solver.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
         multipliers = self.multipliers[:, :, 1:].ravel()
-        return np.r_[self.tension / self.stiffness, multipliers] if self.robot.cable == "sliding" else multipliers
+        if self.robot.cable != "sliding":
+            return multipliers
+        disks = self.disk_multipliers
+        return np.concatenate(
+            [[self.tension / self.stiffness], np.maximum(disks, 0), np.maximum(-disks, 0), multipliers]
+        )
+
+    @property
+    def disk_multipliers(self) -> np.ndarray:
+        """Multiplier of where the disks of each segment meet, negative where it bends away from the cable [rad²/mm].
+
+        ``(n,)`` with a sliding cable, which alone lets segments bend so far; else ``(0,)``.
+        """
+        return self._layout.disk_multipliers(self.block)
 
     @property
     def onset_tension(self) -> float:

@@ -200,6 +200,24 @@ def arc_function() -> ca.Function:
     return ca.Function("ccr_arc", [angle, length, offset], [ca.cse(law)])
 
 
+def disk_gap(angle: Symbol, length: Symbol, radius: Symbol, thickness: Symbol) -> Symbol:
+    """What is left between two disks, at their edges on the side that a segment bends to by ``angle`` [mm].
+
+    The arc at the distance ``radius`` on the inner side has the chord ``2 (l0/θ − R) sin θ/2``, of which the disks take
+    ``t cos θ/2``; without thickness they meet at ``θ = l0/R``.
+    """
+    sinc, cosine = sinc_and_cosine(angle**2 / 4)
+    return length * sinc - radius * angle * sinc - thickness * cosine
+
+
+def disk_gap_function() -> ca.Function:
+    """``(θ, l0, R, t) → c, c', c''`` of :func:`disk_gap` in the angle."""
+    angle, *sizes = (ca.SX.sym(name) for name in ("angle", "length", "radius", "thickness"))
+    gap = disk_gap(angle, *sizes)
+    slope = ca.gradient(gap, angle)
+    return ca.Function("ccr_disk_gap", [angle, *sizes], [ca.cse(ca.vertcat(gap, slope, ca.gradient(slope, angle)))])
+
+
 @lru_cache(maxsize=64)
 def gap_function(law: GapLaw) -> ca.Function:
     """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle, and likewise in space."""
@@ -229,8 +247,9 @@ class NodeProblem(NamedTuple):
         equalities: Zero when every segment has its shape, ``(3n,)`` [mm]. With a uniform cable: lengths of backbone,
             cable and disk minus their values. With a sliding one, whose segments are arcs: length of the chord minus
             its value, component of the chord along the bisector of the disks, length of the disk minus its value.
-        inequalities: Not negative, ``(k,)`` [mm]: slack of a sliding cable, then the gap of every point that can touch,
-            but for node 0, to every obstacle, ordered (obstacle, line, position).
+        inequalities: Not negative, ``(k,)`` [mm]: with a sliding cable its slack, then what is left between the disks
+            of each segment on the cable's side, then on the other; then the gap of every point that can touch, but for
+            node 0, to every obstacle, ordered (obstacle, line, position).
     """
 
     unknowns: ca.MX
@@ -273,11 +292,15 @@ def node_problem(
         sinc, _ = sinc_and_cosine(angle**2 / 4)
         astride = ca.sum1((backbone[:, 1:] - backbone[:, :-1]) * (before + after)) / (2 * offset)
         equalities = ca.horzcat(chords - total / segments * sinc, astride, norms(after) - offset)
-        slack = total - pull - ca.sum2(cables)
+        ahead = ca.vertcat(-before[1, :] - after[1, :], before[0, :] + after[0, :])  # across the bisector of the disks
+        ahead = ahead / ca.repmat(norms(ahead), 2, 1)
+        # The way of the cable lies across the bisector; its length has no slope where the holes of two disks meet.
+        way = ca.sum2(ca.sum1((cable[:, 1:] - cable[:, :-1]) * ahead))
+        limited = ca.vertcat(total - pull - way, *_disk_gaps(robot, backbone, disk, ahead))
     else:
         share = (total - pull) / segments
         equalities = ca.horzcat(chords - total / segments, cables - share, norms(after) - offset)
-        slack = ca.MX(0, 1)
+        limited = ca.MX(0, 1)
     lines = {"backbone": backbone, "cable": cable, "rim": 2 * backbone - cable}
     displacements = ca.reshape(unknowns[4 * segments :], 2, -1)
     springs = ca.reshape(parameters[starts[-1] :], 3, -1)
@@ -296,7 +319,24 @@ def node_problem(
         for line in robot.touch:
             points = divided(lines[line], robot.between)[:, 1:]
             gaps.append(gaps_of(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
-    return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(slack, *gaps))
+    return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(limited, *gaps))
+
+
+def limits(robot: "Robot") -> int:
+    """How many inequalities a robot's node problem has before the gaps to obstacles."""
+    return 1 + 2 * robot.segments if robot.cable == "sliding" else 0
+
+
+def _disk_gaps(robot: "Robot", backbone: ca.MX, disk: ca.MX, ahead: ca.MX) -> list[ca.MX]:
+    """What is left between consecutive disks at their edges, across their bisector, on each side [mm]."""
+    radius, thickness = robot.disk_radius_mm, robot.disk_thickness_mm
+    half_cosine = norms(disk[:, :-1] + disk[:, 1:]) / (2 * robot.offset_mm)
+    gaps = []
+    for side in (1, -1):
+        edges = backbone + side * radius / robot.offset_mm * disk
+        apart = ca.sum1((edges[:, 1:] - edges[:, :-1]) * ahead)
+        gaps.append((apart - thickness * half_cosine).T)
+    return gaps
 
 
 def _rotation(angle: ca.MX) -> ca.MX:

@@ -22,6 +22,7 @@ class Model(NamedTuple):
         cables: Cables.
         frame: Of the directions on a disk, an array of this shape.
         tip: Slopes of the free tip, an array of this shape.
+        disks: Whether the disks of a segment can meet.
     """
 
     space: int
@@ -29,9 +30,11 @@ class Model(NamedTuple):
     cables: int
     frame: tuple[int, ...]
     tip: tuple[int, ...]
+    disks: bool = False
 
 
 PLANE = Model(space=2, controls=1, cables=1, frame=(2,), tip=(3,))
+SLIDING = PLANE._replace(disks=True)
 SPACE = Model(space=3, controls=3, cables=2, frame=(3, 3), tip=(2, 5))
 
 
@@ -69,6 +72,7 @@ class Layout:
         self.onset = self._view(model.cables)
         self.tip_slopes = self._view(*model.tip)
         self.flags = self._view(lines * positions)
+        self.disk_multipliers = self._view(n if model.disks else 0)
         self.trend = self._view(n * model.controls + space * obstacles + MAX_ACTIVE if model.cables == 1 else 0)
 
     def _view(self, *shape: int) -> View:
@@ -87,4 +91,5 @@ def make_layout(model: Model, segments: int, lines: int, positions: int, obstacl
 
 def layout(robot: Robot, obstacles: int) -> Layout:
     """The layout for a robot among a number of obstacles."""
-    return make_layout(PLANE, robot.segments, len(robot.touch), robot.positions, obstacles)
+    model = SLIDING if robot.cable == "sliding" else PLANE
+    return make_layout(model, robot.segments, len(robot.touch), robot.positions, obstacles)

@@ -1,5 +1,6 @@
 """Obstacles of the plane, and what those of space share with them, validated once."""
 
+import itertools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -25,13 +26,13 @@ class Extent(NamedTuple):
     Attributes:
         center: Centre of a disc or ball that holds it [mm].
         radius: Radius of that disc [mm]; infinite for a wall.
-        width: Smallest distance between parallel lines or planes that hold it [mm]; infinite for a wall.
+        inradius: Radius of the largest disc or ball inside it [mm]; infinite for a wall.
         fineness: Smallest radius of curvature of the surface [mm]; infinite for a wall.
     """
 
     center: Place
     radius: float
-    width: float
+    inradius: float
     fineness: float
 
 
@@ -93,6 +94,11 @@ class Obstacle(ABC):
 
         In the plane a closed polygon, ``(k, 2)``, or the surface point of a half-plane; in space a grid, ``(u, v, 3)``.
         """
+
+    @property
+    def surface(self) -> np.ndarray:
+        """Points of its surface where its gap is no distance, ``(k, 2)`` [mm]; none where it is one."""
+        return np.empty((0, self.space))
 
     @abstractmethod
     def shifted(self, by: Iterable[float]) -> Self:
@@ -158,7 +164,7 @@ class Circle(Obstacle):
     @property
     def extent(self) -> Extent:
         """The disc itself."""
-        return Extent(self.center, self.radius, 2 * self.radius, self.radius)
+        return Extent(self.center, self.radius, self.radius, self.radius)
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The circle elsewhere."""
@@ -246,7 +252,12 @@ class Ellipse(Obstacle):
     def extent(self) -> Extent:
         """The disc of the larger half-axis, and the curvature at its end."""
         small, large = sorted(self.radii)
-        return Extent(self.center, large, 2 * small, small**2 / large)
+        return Extent(self.center, large, small, small**2 / large)
+
+    @property
+    def surface(self) -> np.ndarray:
+        """Points of its surface, ``(k, 2)`` [mm]."""
+        return self.outline()
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The ellipse elsewhere."""
@@ -294,7 +305,7 @@ class Capsule(Obstacle):
     def extent(self) -> Extent:
         """The disc about the middle of the line."""
         middle = ((self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2)
-        return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, 2 * self.radius, self.radius)
+        return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, self.radius, self.radius)
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The capsule elsewhere."""
@@ -347,7 +358,7 @@ class Polygon(Obstacle):
         """The disc about the mean of the corners."""
         x, y = np.mean(self.corners, axis=0).tolist()
         farthest = max(math.dist((x, y), corner) for corner in self.corners)
-        return Extent((x, y), farthest + self.radius, _width(np.array(self.corners)) + 2 * self.radius, self.radius)
+        return Extent((x, y), farthest + self.radius, _inradius(np.array(self.corners)) + self.radius, self.radius)
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The polygon elsewhere."""
@@ -435,11 +446,19 @@ def _turns(corners: tuple[Pair, ...]) -> list[float]:
     return list(np.remainder(headings - np.roll(headings, 1) + np.pi, 2 * np.pi) - np.pi)
 
 
-def _width(corners: np.ndarray) -> float:
-    """Smallest distance between parallel lines that hold a convex polygon; one of them lies on an edge [mm]."""
+def _inradius(corners: np.ndarray) -> float:
+    """Radius of the largest disc in a convex polygon, corners counter-clockwise; it touches three of the edges [mm]."""
     edges = np.roll(corners, -1, axis=0) - corners
     inward = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
-    return float(((inward @ corners.T).max(axis=1) - (inward * corners).sum(axis=1)).min())
+    offsets = (inward * corners).sum(axis=1)
+    largest = 0.0
+    for three in map(list, itertools.combinations(range(len(corners)), 3)):
+        sides = np.column_stack([inward[three], -np.ones(3)])  # distance of the centre from each, less the radius
+        if abs(np.linalg.det(sides)) > 1e-12:
+            x, y, radius = np.linalg.solve(sides, offsets[three])
+            if (inward @ (x, y) - offsets).min() >= radius * (1 - 1e-9):
+                largest = max(largest, float(radius))
+    return largest
 
 
 def directions() -> np.ndarray:

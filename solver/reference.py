@@ -11,21 +11,23 @@ import numpy as np
 
 from solver.equilibrium import Equilibrium
 from solver.forces import onset_tension
-from solver.formulation import node_derivatives, node_problem
+from solver.formulation import limits, node_derivatives, node_problem
 from solver.free import free_angle, free_tension, tip_slopes
 from solver.geometry import touchable_points, touching_points
 from solver.layout import layout
 from solver.robot import Robot
 from solver.scene import Scene
-from solver.solve import check_clear, check_command, check_width
+from solver.solve import check_clear, check_command, check_core
 from solver.status import Status
 
-LARGEST_STEP, SMALLEST_STEP = 0.25, 0.03  # cable, or half the insertion, of one solve, and of its last try [mm]
-PRETENSION = 0.05  # a touching robot is not slackened below it [mm]
-SLACK = 1e-3  # below it a shear costs too little for IPOPT, and the robot is taken as free [mm]
+# Displacements of the cable are over its offset a, places over the length L of the robot at its longest.
+LARGEST_STEP, SMALLEST_STEP = 0.03, 0.004  # of one solve, and of its last try [a]
+INSERTION = 11.25  # displacement that counts as much as an insertion by L [a]
+PRETENSION = 0.00625  # a touching robot is not slackened below it [a]
+SLACK = 1.25e-4  # below it a shear costs too little for IPOPT, and the robot is taken as free [a]
 TURN = 0.02  # unit of the angles of a robot with a sliding cable [rad]
-RESOLUTION = 1e-6  # to which the command at the tension limit is found [mm]
-MOVE_OFFSET, MOVE_SLOPE = 0.5, 16.0  # a node that moves farther than offset + slope·|step| has left the branch [mm]
+RESOLUTION = 1.25e-7  # to which the command at the tension limit is found [a]
+MOVE_OFFSET, MOVE_SLOPE = 0.0028, 0.71  # a node that moves farther than offset + slope·|step| has left the branch [L]
 
 OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -74,7 +76,7 @@ class _Pose(NamedTuple):
 class ReferenceSolver:
     """Follows the same equilibria as :class:`solver.Solver`, by the problem as the paper writes it.
 
-    Only a branch is followed: where it ends in a snap or a jam, a step is ``FAILED``.
+    Only a branch is followed: where it ends in a snap or a jam, a step is ``GAVE_UP``.
 
     Args:
         robot: The robot.
@@ -91,8 +93,9 @@ class ReferenceSolver:
         self.robot = robot
         self.scene = scene
         self._touchable = touchable_points(robot, scene)
-        check_width(robot, scene)
+        check_core(robot, scene)
         self._sliding = robot.cable == "sliding"
+        self._limits = limits(robot)
         self._build()
         self._rest = self._equilibrium(self._free(0.0, robot.length_mm), Status.CONVERGED, 0)
         check_clear(self._rest)
@@ -111,21 +114,21 @@ class ReferenceSolver:
 
         Returns:
             The equilibrium reached: ``CONVERGED``, ``STALLED`` at the tension limit, or
-            ``FAILED`` with the present one.
+            ``GAVE_UP`` with the present one.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
         length = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         present, iterations, largest = self._start(equilibrium), 0, LARGEST_STEP
-        while (distance := _apart(present, cable := self._goal(present, cable_mm), length)) > 0:
+        while (distance := self._apart(present, cable := self._goal(present, cable_mm), length)) > 0:
             part = min(1.0, largest / distance)
             following = self._between(present, cable, length, part)
             if following is None:
                 if largest > SMALLEST_STEP:
                     largest /= 2
                     continue
-                return Equilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.FAILED, iterations)
+                return Equilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.GAVE_UP, iterations)
             iterations += following.iterations
             if self._tension(following) > max(self.robot.max_tension, self._tension(present)):
                 return self._equilibrium(self._limit(present, following), Status.STALLED, iterations, equilibrium)
@@ -157,7 +160,7 @@ class ReferenceSolver:
         lagrangian = problem.objective + ca.dot(multipliers, constraints)
         slope = ca.gradient(lagrangian, problem.parameters)[0]
         self._cable_slope = ca.Function("cable_slope", [problem.unknowns, problem.parameters, multipliers], [slope])
-        bounded = np.concatenate([np.ones(int(self._sliding), bool), self._touchable[:, :, 1:].ravel()])
+        bounded = np.concatenate([np.ones(self._limits, bool), self._touchable[:, :, 1:].ravel()])
         self._lower = np.concatenate([np.zeros(3 * n), np.where(bounded, 0.0, -np.inf)])
         self._upper = np.concatenate([np.zeros(3 * n), np.full(bounded.size, np.inf)])
 
@@ -169,7 +172,8 @@ class ReferenceSolver:
 
     def _goal(self, point: _Point, cable: float) -> float:
         touching = not self._sliding and bool(self._pushes(point).any())
-        return max(cable, min(point.cable, PRETENSION)) if touching else cable
+        pretension = PRETENSION * self.robot.offset_mm
+        return max(cable, min(point.cable, pretension)) if touching else cable
 
     def _shape(self, cable: float, length: float, coordinates: np.ndarray) -> np.ndarray:
         """Unknowns of the robot with given reduced coordinates: angles of its arcs, or sines of its shear angles."""
@@ -192,8 +196,10 @@ class ReferenceSolver:
         angle = free_angle(robot, cable) if self._sliding else 0.0
         straight = np.zeros(2 * sum(self.scene.mounted))
         unknowns = np.r_[self._shape(cable, length, np.full(robot.segments, angle)), straight]
-        taut = [free_tension(robot, cable) / robot.stiffness] if self._sliding else []
-        return self._balanced(cable, length, unknowns, np.r_[taut, np.zeros(self._touchable[:, :, 1:].size)])
+        pushes = np.zeros(self._limits + self._touchable[:, :, 1:].size)
+        if self._sliding:
+            pushes[0] = free_tension(robot, cable) / robot.stiffness
+        return self._balanced(cable, length, unknowns, pushes)
 
     def _balanced(self, cable: float, length: float, unknowns: np.ndarray, pushes: np.ndarray) -> _Point:
         """A shape with multipliers of its inequalities, and those of the equalities by least squares."""
@@ -210,7 +216,7 @@ class ReferenceSolver:
 
     def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
         """The solution under another command, ``None`` where IPOPT does not converge to it or leaves the branch."""
-        if cable < SLACK and not self._sliding:
+        if cable < SLACK * self.robot.offset_mm and not self._sliding:
             return self._free(cable, length)
         scale = self._scale(cable)
         shape = self._shape(cable, length, self._pose(start.unknowns, start.length).coordinates)
@@ -224,7 +230,7 @@ class ReferenceSolver:
         )
         unknowns = solution["x"].full().ravel()
         moved = np.linalg.norm((unknowns - start.unknowns).reshape(-1, 2), axis=1).max()
-        allowed = MOVE_OFFSET + MOVE_SLOPE * _apart(start, cable, length)
+        allowed = self.robot.lengths_mm[1] * (MOVE_OFFSET + MOVE_SLOPE * self._apart(start, cable, length))
         stats = self._nlp_solver.stats()
         if not (stats["success"] and moved <= allowed):
             return None
@@ -243,7 +249,7 @@ class ReferenceSolver:
     def _limit(self, below: _Point, above: _Point) -> _Point:
         """The tension limit between two points of the branch, from below, by bisection."""
         present, high = below, 1.0
-        low, span = 0.0, _apart(below, above.cable, above.length)
+        low, span = 0.0, self._apart(below, above.cable, above.length)
         while (high - low) * span > RESOLUTION:
             middle = (low + high) / 2
             point = self._between(below._replace(unknowns=present.unknowns), above.cable, above.length, middle)
@@ -283,7 +289,7 @@ class ReferenceSolver:
         pose = self._pose(point.unknowns, point.length)
         nodes = np.column_stack([pose.backbone, pose.angles])
         multipliers = np.zeros(self._touchable.shape)
-        multipliers[:, :, 1:] = self._pushes(point)[int(self._sliding) :].reshape(multipliers[:, :, 1:].shape)
+        multipliers[:, :, 1:] = self._pushes(point)[self._limits :].reshape(multipliers[:, :, 1:].shape)
         displacements = np.zeros((len(self.scene), 2))
         displacements[list(self.scene.mounted)] = self._mounts(point).reshape(-1, 2)
         parts: list[Any] = [
@@ -307,6 +313,8 @@ class ReferenceSolver:
         places.force(block)[:] = places.forces(block).sum(axis=0)
         places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
         places.flags(block)[:] = (multipliers > 0).any(axis=0).ravel()
+        disks = self._pushes(point)[1 : self._limits].reshape(2, -1) if self._sliding else np.zeros((2, 0))
+        places.disk_multipliers(block)[:] = disks[0] - disks[1]
         places.tip_slopes(block)[:] = tip_slopes(self.robot.at(point.length), point.cable)
         now = Equilibrium(self.robot, self.scene, block.copy(), status, iterations)
         places.onset(block)[0] = 0.0 if before is None else onset_tension(before, now)
@@ -318,7 +326,7 @@ class ReferenceSolver:
         gaps = np.reshape([obstacle.gap(points - shift) for obstacle, shift in moved], self._touchable.shape)
         return np.where(self._touchable, gaps, np.inf)
 
-
-def _apart(point: _Point, cable: float, length: float) -> float:
-    """How far a command is, in steps of the cable [mm]."""
-    return max(abs(cable - point.cable), abs(length - point.length) / 2)
+    def _apart(self, point: _Point, cable: float, length: float) -> float:
+        """How far a command is, in displacements of the cable [a]."""
+        inserted = INSERTION * abs(length - point.length) / self.robot.lengths_mm[1]
+        return max(abs(cable - point.cable) / self.robot.offset_mm, inserted)

@@ -1,7 +1,7 @@
 """The robot: what the solver needs to know of it, validated once."""
 
 import math
-from collections.abc import Sized
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -27,6 +27,9 @@ class Robot:
         touch: The lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and
             ``"rim"``, the edge of the disks opposite to the cable.
         between: Number of points of each line, evenly spaced between every two nodes, that can touch as well.
+        disk_radius_mm: Radius R of the disks, whose edges meet where a segment bends far [mm]; ``None`` stands for
+            ``offset_mm``. A uniform cable shears its segments before they bend as far.
+        disk_thickness_mm: Thickness t of the disks [mm].
 
     Raises:
         ValueError: If a value is not finite, not positive, or out of range; the message names the bound.
@@ -42,9 +45,12 @@ class Robot:
     length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0
+    disk_radius_mm: float | None = None
+    disk_thickness_mm: float = 0.0
 
     def __post_init__(self) -> None:
         check_numbers(self, LINES)
+        self._check_disks()
         if self.cable not in CABLES:
             raise ValueError(f"cable is {self.cable!r}; it must be one of {', '.join(CABLES)}")
         self._check_lengths()
@@ -56,6 +62,17 @@ class Robot:
             raise ValueError(
                 f"max_cable_mm is {self.max_cable_mm}; it must be below {bound} "
                 "(the backbone's shortest length, and the disks' reach 2·n·a)"
+            )
+
+    def _check_disks(self) -> None:
+        if self.disk_radius_mm is None:
+            object.__setattr__(self, "disk_radius_mm", self.offset_mm)
+        require_positive("disk_radius_mm", self.disk_radius_mm)
+        shortest = min(self.length_range_mm or (self.length_mm,)) / self.segments
+        if not 0 <= self.disk_thickness_mm < shortest:
+            raise ValueError(
+                f"disk_thickness_mm is {self.disk_thickness_mm}; it must be from 0 to below {shortest:.6g}, "
+                "the length of a segment"
             )
 
     def _check_lengths(self) -> None:
@@ -122,9 +139,21 @@ class Robot:
         return self.segments * (self.between + 1) + 1
 
     @property
-    def spacing_mm(self) -> float:
-        """Largest distance between neighbouring points of the backbone that can touch [mm]."""
-        return self.lengths_mm[1] / self.segments / (self.between + 1)
+    def edges_mm(self) -> tuple[float, ...]:
+        """Longest distance there can be between neighbouring points of each line of ``touch`` [mm].
+
+        A line beside the backbone is stretched where its segment bends away from it: by an arc up to where the disks
+        meet, with a uniform cable by a shear up to where the cable has no more length to give.
+        """
+        segment = self.lengths_mm[1] / self.segments
+        if self.cable == "sliding":
+            assert self.disk_radius_mm is not None
+            widest = (segment - self.disk_thickness_mm) / self.disk_radius_mm
+            stretched = [abs(line) * widest for line in self.lines_mm]
+        else:
+            turned = math.sqrt(segment**2 - (segment - self.cable_limit_mm / self.segments) ** 2) / self.offset_mm
+            stretched = [max(0.0, -line) * turned for line in self.lines_mm]
+        return tuple((segment + stretch) / (self.between + 1) for stretch in stretched)
 
     @property
     def stiffness(self) -> float:
@@ -158,8 +187,8 @@ class AnyRobot(Protocol):
         """Number of points of a line that can touch, node 0 included."""
 
     @property
-    def spacing_mm(self) -> float:
-        """Largest distance between neighbouring points of the backbone that can touch [mm]."""
+    def edges_mm(self) -> Sequence[float]:
+        """Longest distance there can be between neighbouring points of each line [mm]."""
 
 
 def check_numbers(robot: Any, lines: tuple[str, ...]) -> None:

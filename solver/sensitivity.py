@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from solver.equilibrium import BaseEquilibrium, Equilibrium
-from solver.formulation import kkt_derivatives
+from solver.formulation import kkt_derivatives, limits
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,8 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     if not sliding and not equilibrium.cable_mm > 0:
         raise ValueError(f"cable_mm is {equilibrium.cable_mm}; it must be positive, for the shear to be determined")
     kkt = kkt_derivatives(robot, scene.laws, scene.mounted)
-    change = respond(equilibrium, kkt, active, [equilibrium.tension > 0] if sliding else [])
+    held = equilibrium.pushes[: limits(robot)] > 0  # a taut cable, and disks that meet
+    change = respond(equilibrium, kkt, active, held.tolist())
     load_changes = change.loads
     load_changes[LENGTH] -= change.load / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
     for rows in (change.unknowns, change.multipliers, load_changes):

@@ -1,19 +1,43 @@
 """The solver: one robot in one scene, its equilibria followed step by step."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from solver import _kernel
 from solver._kernel import SHAPE_SIZE
 from solver.compile import law_address
-from solver.equilibrium import BaseEquilibrium, Equilibrium
+from solver.equilibrium import BaseEquilibrium, Equilibrium, Optimality
 from solver.geometry import touchable_points
 from solver.layout import LENGTH
 from solver.obstacles import SHAPES
 from solver.robot import AnyRobot, Robot
 from solver.scene import Scene
 from solver.status import Status
+
+
+class Trace(NamedTuple):
+    """The shapes accepted on the way of a step, from the one it started at on.
+
+    Attributes:
+        nodes: In the plane backbone point and disk angle of each node, ``(k, n+1, 3)`` [mm, mm, rad], in space the
+            point, ``(k, n+1, 3)`` [mm].
+        points: The points that can touch, by line and position, ``(k, p, j, d)`` [mm].
+        displacements: How far each obstacle has been pushed from its place, ``(k, m, d)`` [mm].
+    """
+
+    nodes: np.ndarray
+    points: np.ndarray
+    displacements: np.ndarray
+
+
+def read_trace(numbers: list[float], robot: AnyRobot, scene: Scene, space: int) -> Trace:
+    """The shapes that the kernel has written one after the other."""
+    parts = ((robot.segments + 1, 3), (len(robot.lines_mm), robot.positions, space), (len(scene), space))
+    ends = np.cumsum([math.prod(part) for part in parts])
+    rows = np.reshape(numbers, (-1, int(ends[-1])))
+    return Trace(*(columns.reshape(-1, *part) for columns, part in zip(np.split(rows, ends[:-1], 1), parts, strict=True)))
 
 
 class Solver:
@@ -27,7 +51,7 @@ class Solver:
         scene: The obstacles.
 
     Raises:
-        ValueError: If an obstacle overlaps the straight robot, is narrow enough to slip between its points, or names a
+        ValueError: If an obstacle overlaps the straight robot, is small enough to slip between its points, or names a
             node the robot does not have.
         RuntimeError: If a :class:`~solver.custom.Custom` shape cannot be compiled.
     """
@@ -35,7 +59,7 @@ class Solver:
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self.robot = robot
         self.scene = scene
-        check_width(robot, scene)
+        check_core(robot, scene)
         self._kernel = _kernel.Kernel(kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
         straight[LENGTH] = robot.length_mm
@@ -66,8 +90,8 @@ class Solver:
         length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         return self._follow(equilibrium.block, cable_mm, length_mm)
 
-    def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> np.ndarray:
-        """Every shape accepted on the way of :meth:`step`, from the present one on, ``(k, n+1, 3)`` [mm, mm, rad].
+    def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Trace:
+        """Every shape accepted on the way of :meth:`step`, from the present one on.
 
         Shows what happens inside a step: its sub-steps, and the descent through a snap.
 
@@ -75,13 +99,21 @@ class Solver:
             ValueError: As :meth:`step`.
         """
         length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
-        shapes = self._kernel.trace(equilibrium.block, (cable_mm, length_mm))
-        return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
+        return read_trace(self._kernel.trace(equilibrium.block, (cable_mm, length_mm)), self.robot, self.scene, 2)
+
+    def optimality(self, equilibrium: Equilibrium) -> Optimality:
+        """How well an equilibrium meets its conditions, computed anew by the kernel.
+
+        Raises:
+            ValueError: If the equilibrium is another robot's or scene's.
+        """
+        check_origin(self.robot, self.scene, equilibrium)
+        return Optimality(*self._kernel.optimality(equilibrium.block))
 
     def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
-        status, iterations = self._kernel.step(block, cable_mm, length_mm, reached)
-        return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
+        status, iterations, factorizations = self._kernel.step(block, cable_mm, length_mm, reached)
+        return Equilibrium(self.robot, self.scene, reached, Status(status), iterations, factorizations)
 
 
 def kernel_robot(robot: Robot) -> _kernel.Robot:
@@ -94,7 +126,10 @@ def kernel_robot(robot: Robot) -> _kernel.Robot:
         rigidity=robot.rigidity,
         max_tension=robot.max_tension,
         max_length=robot.lengths_mm[1],
+        disk_radius=robot.disk_radius_mm or robot.offset_mm,
+        disk_thickness=robot.disk_thickness_mm,
         lines=[(line, 0.0) for line in robot.lines_mm],
+        edges=list(robot.edges_mm),
         between=robot.between,
     )
 
@@ -109,7 +144,7 @@ def kernel_scene(robot: Robot, scene: Scene) -> _kernel.Scene:
     return _kernel.Scene(*scene_arrays(robot, scene))
 
 
-SceneArrays = tuple[list[int], np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[int]]
+SceneArrays = tuple[list[int], np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[int], list[np.ndarray]]
 
 
 def scene_arrays(robot: AnyRobot, scene: Scene) -> SceneArrays:
@@ -123,25 +158,28 @@ def scene_arrays(robot: AnyRobot, scene: Scene) -> SceneArrays:
     return (
         [SHAPES[obstacle.kind] for obstacle in scene],
         np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
-        np.array([(*center, radius, fineness) for center, radius, _, fineness in extents], dtype=float),
+        np.array([(*center, radius, fineness, inradius) for center, radius, inradius, fineness in extents], dtype=float),
         touchable_points(robot, scene).reshape(len(scene), len(robot.lines_mm) * robot.positions),
         np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
         [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
+        [np.ascontiguousarray(obstacle.surface) for obstacle in scene],
     )
 
 
-def check_width(robot: AnyRobot, scene: Scene) -> None:
-    """Refuse obstacles narrow enough to slip between two points of the robot that can touch.
+def check_core(robot: AnyRobot, scene: Scene) -> None:
+    """Refuse obstacles that could slip through an edge of the robot: those with no point deeper than half an edge.
 
     Raises:
-        ValueError: Naming the obstacle, its width and what the robot needs.
+        ValueError: Naming the obstacle, its inner radius and what the robot needs.
     """
     for obstacle in scene:
-        width = obstacle.extent.width
-        if obstacle.nodes is None and width < robot.spacing_mm:
+        touchable = obstacle.touchable(robot.segments + 1)
+        inradius, longest = obstacle.extent.inradius, max(robot.edges_mm)
+        if (touchable[1:] & touchable[:-1]).any() and not 2 * inradius > longest:
+            between = math.floor(longest * (robot.between + 1) / (2 * inradius))
             raise ValueError(
-                f"{obstacle!r} is {width:.3g} mm wide and could slip between points {robot.spacing_mm:.3g} mm apart; "
-                f"give the robot between={math.ceil(robot.spacing_mm * (robot.between + 1) / width) - 1} or more"
+                f"the largest disc or ball in {obstacle!r} has the radius {inradius:.3g} mm; it could slip between points "
+                f"of the robot, up to {longest:.3g} mm apart: give the robot between={between} or more"
             )
 
 

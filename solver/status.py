@@ -6,21 +6,23 @@ from enum import IntEnum
 class Status(IntEnum):
     """How a step of the solver ended. Every verdict comes with a valid equilibrium.
 
-    A step that both snaps and stalls or jams is reported by how it ended. A small snap that a single increment carries
-    past, with no node moving more than 0.5 mm + 16 times the increment and 8.5 mm at most, is not told from ordinary
-    motion.
+    Where several things happened in one step, the highest value is reported.
     """
 
     CONVERGED = 0
     """The commanded cable displacement was reached along the branch."""
     SNAPPED = 1
-    """The equilibrium turned unstable on the way; the robot moved to the one it reaches physically."""
+    """The equilibrium turned unstable on the way and the robot moved, against what the slope of its branch predicts, to
+    the one it reaches physically."""
     STALLED = 2
     """The cable tension reached the robot's limit, or would exceed it in a snap; the cable moved as far as that.
 
     Where a release ends in a snap to more tension than the motor holds, it yields: the cable goes farther than asked.
     """
-    JAMMED = 3
-    """Geometry blocks the robot; the largest feasible part of the increment was applied."""
-    FAILED = 4
-    """No equilibrium was found; the previous one is returned."""
+    BLOCKED = 3
+    """Geometry blocks the robot below its tension limit: to first order, no motion meets the command and every obstacle.
+
+    The tension grows without bound on the way to such a place, so that a finite limit stalls the robot first.
+    """
+    GAVE_UP = 4
+    """The solver's budget of work ran out; the last valid equilibrium on the way is kept."""

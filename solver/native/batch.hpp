@@ -22,18 +22,21 @@ class Batch {
   std::size_t block_size() const { return workers_[0]->block_size(); }
   std::vector<Obstacle<D>>& scene(int robot) { return scenes_[robot]; }
 
-  // Calls `work` with a follower among the obstacles of each of some robots, and the place of the robot in the list.
-  template <class Work>
-  void each(const std::vector<int>& robots, Work work) {
+  // Calls `work` with a follower among the obstacles of each of some robots, and the place of the robot in the list, until
+  // the calling thread is told to `stop`.
+  template <class Work, class Stop>
+  void each(const std::vector<int>& robots, Work work, Stop& stop) {
     std::atomic<int> next = 0;
     const int count = static_cast<int>(robots.size());
     const auto run = [&](int thread) {
       Follower<D>& worker = *workers_[thread];
-      for (int first; (first = next.fetch_add(kChunk)) < count;)
+      for (int first; (first = next.fetch_add(kChunk)) < count;) {
         for (int k = first; k < std::min(first + kChunk, count); ++k) {
           worker.enter(scenes_[robots[k]]);
           work(worker, k);
         }
+        if (thread == 0 && stop()) next = count;
+      }
     };
     if (workers_.size() == 1 || count <= kAlone) return run(0);
     pool_.run(run);

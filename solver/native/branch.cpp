@@ -5,20 +5,13 @@
 #include <limits>
 
 #include "models.hpp"
+#include "sweep.hpp"
 
 namespace ccr {
 
 using namespace limits;
 
 namespace {
-
-// How far apart two commands are, in steps of a cable [mm].
-template <int C>
-double apart(const Command<C>& a, const Command<C>& b) {
-  double farthest = std::abs(a.length - b.length) / 2;
-  for (int k = 0; k < C; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
-  return farthest;
-}
 
 template <int C>
 Command<C> between(const Command<C>& a, const Command<C>& b, double t) {
@@ -54,6 +47,15 @@ void write(const std::array<double, N>& numbers, double*& block, std::size_t cou
 
 }  // namespace
 
+// How far apart two commands are, in displacements of a cable [a].
+template <class Model>
+double Branch<Model>::apart(const Command& a, const Command& b) const {
+  const Robot& robot = newton_.chain.robot();
+  double farthest = 0;
+  for (int k = 0; k < kCables; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
+  return std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
+}
+
 template <class Model>
 Branch<Model>::Branch(const Robot& robot, int obstacles)
     : newton_(robot, obstacles), nodes_(robot.segments + 1), frames_(robot.segments + 1), points_(robot.points()) {
@@ -73,9 +75,9 @@ template <class Model>
 std::size_t Branch<Model>::block_size() const {
   const std::size_t n = present_.controls.size(), contacts = newton_.chain.contacts();
   const std::size_t points = newton_.chain.points().size(), obstacles = contacts / points;
-  const std::size_t of_frames = (n + 1) * Frame{}.v.size(), of_trend = n * Model::kControl + kSpace * obstacles + kMaxActive;
+  const std::size_t of_disks = Model::kSliding * n, of_frames = (n + 1) * Frame{}.v.size(), of_trend = n * Model::kControl + kSpace * obstacles + kMaxActive;
   return 2 * kCables + 2 + n * Model::kControl + 3 * (n + 1) + of_frames + 2 * contacts + kSpace * (2 * obstacles + 1) + 1 +
-         kCables + Model::kTip + points + kTrend * of_trend;
+         kCables + Model::kTip + points + of_disks + kTrend * of_trend;
 }
 
 template <class Model>
@@ -85,7 +87,7 @@ void Branch<Model>::load(const double* block) {
   read(block, present_.command.cables.v);
   present_.command.length = *block++;
   read(block, tensions_.v);
-  ++block;
+  energy_ = *block++;
   for (auto& control : present_.controls) read(block, control.v);
   for (Position& node : nodes_) {
     for (int k = 0; k < kSpace; ++k) node[k] = block[k];
@@ -100,6 +102,7 @@ void Branch<Model>::load(const double* block) {
   };
   read_mounts(present_.mounts);
   mounts_ = present_.mounts;
+  energy_ += newton_.chain.spring_energy(present_.mounts, present_.command.length);
   newton_.chain.look_around(nodes_, present_.mounts);
   place_points<Model>(chain.robot(), nodes_, frames_, points_);
   block += kSpace * (obstacles + 1) + 1;
@@ -114,9 +117,15 @@ void Branch<Model>::load(const double* block) {
         active.multiplier[active.count++] = multipliers[c];
       }
   block += points;
-  if (Model::kSliding && tensions_[0] > 0 && active.count < kMaxActive) {
-    active.contact[active.count] = chain.contacts();
-    active.multiplier[active.count++] = tensions_[0] / chain.robot().stiffness(present_.command.length);
+  const auto add = [&](int contact, double multiplier) {
+    if (active.count == kMaxActive) return;
+    active.contact[active.count] = contact;
+    active.multiplier[active.count++] = multiplier;
+  };
+  if (Model::kSliding) {
+    if (tensions_[0] > 0) add(chain.slack(), tensions_[0] / chain.robot().stiffness(present_.command.length));
+    for (int i = 0; i < chain.robot().segments; ++i, ++block)
+      if (*block != 0) add(chain.disks() + 2 * i + (*block < 0), std::abs(*block));
   }
   settled_ = false;
   touched_ = chain.touching(active);
@@ -165,6 +174,14 @@ void Branch<Model>::store(double* block) {
   for (int j = 0; j < active.count; ++j)
     if (active.contact[j] < chain.contacts()) block[active.contact[j] % points] = 1;
   block += points;
+  if (Model::kSliding) {  // of the disks that meet, with the sign of the angle between them
+    const int n = chain.robot().segments;
+    std::fill_n(block, n, 0.0);
+    for (int j = 0; j < active.count; ++j)
+      if (const int disk = active.contact[j] - chain.disks(); disk >= 0)
+        block[disk / 2] = disk % 2 == 0 ? active.multiplier[j] : -active.multiplier[j];
+    block += n;
+  }
   if (!kTrend) return;
   for (const auto& control : trend_.controls) write(control);
   write_mounts(trend_.mounts);
@@ -181,7 +198,14 @@ void Branch<Model>::remember() {
   points_ = newton_.chain.points();
   mounts_ = present_.mounts;
   if (!trace) return;
-  for (const auto& s : newton_.chain.states()) trace->insert(trace->end(), s.v.begin(), s.v.begin() + 3);
+  const Chain& chain = newton_.chain;
+  for (const auto& s : chain.states()) trace->insert(trace->end(), s.v.begin(), s.v.begin() + 3);
+  for (const Position& point : points_) trace->insert(trace->end(), point.v.begin(), point.v.end());
+  for (std::size_t j = 0; j < chain.obstacles().size(); ++j) {
+    const int mount = chain.mount_of(static_cast<int>(j));
+    const Position moved = mount < 0 ? Position{} : mounts_[mount];
+    trace->insert(trace->end(), moved.v.begin(), moved.v.end());
+  }
 }
 
 template <class Model>
@@ -189,6 +213,7 @@ void Branch<Model>::accept() {
   learn();
   std::swap(present_, trial_);
   tensions_ = trial_tensions_;
+  energy_ = newton_.chain.energy();
   settled_ = true;
   remember();
 }
@@ -221,12 +246,17 @@ void Branch<Model>::forget() {
 // From `present_` along the trend.
 template <class Model>
 void Branch<Model>::predict() {
+  steady_ = false;
   if (!kTrend) return;
   const double pulled = trial_.command.cables[0] - present_.command.cables[0];
   const auto go_on = [&](auto& at, const auto& slope) {
     for (std::size_t k = 0; k < slope.v.size(); ++k) at[k] += pulled * slope[k];
   };
-  for (std::size_t i = 0; i < trend_.controls.size(); ++i) go_on(trial_.controls[i], trend_.controls[i]);
+  for (std::size_t i = 0; i < trend_.controls.size(); ++i) {
+    go_on(trial_.controls[i], trend_.controls[i]);
+    steady_ |= trial_.controls[i].v != present_.controls[i].v;
+  }
+  predicted_ = trial_.controls;
   for (std::size_t m = 0; m < trend_.mounts.size(); ++m) go_on(trial_.mounts[m], trend_.mounts[m]);
   for (int j = 0; j < trial_.active.count; ++j)
     trial_.active.multiplier[j] = std::max(0.0, trial_.active.multiplier[j] + pulled * trend_.multipliers[j]);
@@ -238,31 +268,58 @@ void Branch<Model>::settle() {
   newton_.chain.evaluate(present_);
   newton_.chain.reduced_gradient(present_.active);
   tensions_ = newton_.chain.tensions(present_.active);
+  energy_ = newton_.chain.energy();
   settled_ = true;
 }
 
-// Whether every point came here from the last accepted shape without cutting through an obstacle or jumping.
+// How far points and mounts have come from the last accepted shape at most [mm].
 template <class Model>
-bool Branch<Model>::passable(double allowed) const {
+double Branch<Model>::farthest() const {
   const Chain& chain = newton_.chain;
-  const int points = chain.robot().points();
   double farthest = 0, shift = 0;
-  for (int k = 0; k < points; ++k) {
+  for (std::size_t k = 0; k < points_.size(); ++k) {
     const Position move = minus(chain.points()[k], points_[k]);
     farthest = std::max(farthest, dot(move, move));
   }
-  farthest = std::sqrt(farthest);
-  for (std::size_t m = 0; m < trial_.mounts.size(); ++m)
-    shift = std::max(shift, norm(minus(trial_.mounts[m], mounts_[m])));
-  if (std::max(farthest, shift) > allowed) return false;
-  for (std::size_t j = 0; j < chain.obstacles().size(); ++j) {
+  for (std::size_t m = 0; m < trial_.mounts.size(); ++m) {
+    const Position move = minus(trial_.mounts[m], mounts_[m]);
+    shift = std::max(shift, dot(move, move));
+  }
+  return std::sqrt(farthest) + std::sqrt(shift);
+}
+
+// Whether the robot came here from the last accepted shape without passing through an obstacle.
+template <class Model>
+bool Branch<Model>::passable(double moved) const {
+  const Chain& chain = newton_.chain;
+  const std::vector<double>& edges = chain.robot().edges;
+  const double longest = *std::max_element(edges.begin(), edges.end());
+  for (int j = 0; j < static_cast<int>(chain.obstacles().size()); ++j) {
     const auto& obstacle = chain.obstacles()[j];
-    if (farthest + shift <= kSweepStride * obstacle.fineness || chain.far(static_cast<int>(j), farthest)) continue;
-    const int mount = chain.mount_of(j);
-    const Position before = mount < 0 ? Position{} : mounts_[mount], now = mount < 0 ? Position{} : trial_.mounts[mount];
-    for (int k = 0; k < points; ++k)
-      if (obstacle.touchable[k] && !passes(obstacle, minus(points_[k], before), minus(chain.points()[k], now)))
-        return false;
+    if (chain.far(j, moved)) continue;
+    if (moved <= harmless_path(obstacle) && moved <= harmless_motion(obstacle, longest)) continue;
+    if (!unswept(obstacle, chain.mount_of(j), moved)) return false;
+  }
+  return true;
+}
+
+template <class Model>
+bool Branch<Model>::unswept(const Obstacle<kSpace>& obstacle, int mount, double moved) const {
+  const Robot& robot = newton_.chain.robot();
+  const Position before = mount < 0 ? Position{} : mounts_[mount], now = mount < 0 ? Position{} : trial_.mounts[mount];
+  const double path = harmless_path(obstacle);
+  const auto from = [&](int k) { return minus(points_[k], before); };
+  const auto to = [&](int k) { return minus(newton_.chain.points()[k], now); };
+  const auto beyond = [&](int k, double reach) { return clearance_beyond(obstacle, from(k), reach) > 0; };
+  for (int line = 0, first = 0; line < static_cast<int>(robot.lines.size()); ++line, first += robot.positions()) {
+    const double longest = robot.edges[line];
+    const bool edges = moved > harmless_motion(obstacle, longest);
+    for (int k = first; k < first + robot.positions(); ++k) {
+      if (!obstacle.touchable[k] || beyond(k, moved + longest)) continue;
+      if (norm(minus(to(k), from(k))) > path && !path_clear(obstacle, from(k), to(k))) return false;
+      if (!edges || k + 1 == first + robot.positions() || !obstacle.touchable[k + 1]) continue;
+      if (!edge_clear<kSpace>(obstacle, {from(k), from(k + 1)}, {to(k), to(k + 1)}, longest / 2)) return false;
+    }
   }
   return true;
 }
@@ -271,7 +328,7 @@ template <class Model>
 bool Branch<Model>::attempt_free() {
   if (newton_.chain.touching(trial_.active)) return false;
   newton_.chain.relax(trial_);
-  return newton_.chain.evaluate(trial_) && newton_.chain.violation() <= kFeasibility;
+  return newton_.chain.evaluate(trial_) && newton_.chain.violation() <= kFeasibility * newton_.chain.robot().max_length;
 }
 
 // Leaves in `trial_` the equilibrium under another command, if it continues the branch from `present_`.
@@ -287,14 +344,77 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
     iterations += verdict.iterations;
     if (!verdict.converged) return Move::kRejected;
   }
-  if (!passable(std::min(kMoveOffset + kMoveSlope * apart(present_.command, command), kMoveLargest)))
-    return Move::kRejected;
+  const double moved = farthest(), length = newton_.chain.robot().max_length, size = apart(present_.command, command);
+  if (moved > length * std::min(kMoveOffset + kMoveSlope * size, kMoveLargest) || !passable(moved)) return Move::kRejected;
   newton_.chain.reduced_gradient(trial_.active);
   trial_tensions_ = newton_.chain.tensions(trial_.active);
+  if (jumped(command, moved)) return Move::kRejected;
   const double tension = highest(trial_tensions_);
   const bool pulled = pulls(command) && command.length == present_.command.length;
   const bool rising = pulled || (!releases(command) && tension > highest(tensions_));
-  return rising && tension > newton_.chain.robot().max_tension ? Move::kOverTension : Move::kAccepted;
+  const double limit = newton_.chain.robot().max_tension;
+  if (rising && tension > limit) return Move::kOverTension;
+  // The tension may rise above the limit on the way and sink again: by at most twice the mean of what it is above the
+  // straight line between its ends.
+  const double between = 2 * std::abs(lost(command)) * newton_.chain.stiffness() / (size * newton_.chain.robot().offset);
+  const bool peaks = pulled && std::max(tension, highest(tensions_)) + between > limit;
+  return peaks && size > kPeakStep ? Move::kRejected : Move::kAccepted;
+}
+
+// Energy that is not accounted for by the work of the cables, their tension taken to change evenly on the way from
+// `present_` to `trial_` [rad^2].
+template <class Model>
+double Branch<Model>::lost(const Command& command) const {
+  double work = 0;
+  for (int k = 0; k < kCables; ++k) {
+    const double pulled = std::abs(command.cables[k]) - std::abs(present_.command.cables[k]);
+    work += (tensions_[k] + trial_tensions_[k]) / 2 * pulled;
+  }
+  return work / newton_.chain.stiffness() - (newton_.chain.energy() - energy_);
+}
+
+// Whether the robot came to `trial_` by a jump, and not along its branch: it went elsewhere than the trend tells, energy
+// was lost on the way, and the way back does not lead to where it came from.
+template <class Model>
+bool Branch<Model>::jumped(const Command& command, double moved) {
+  const Chain& chain = newton_.chain;
+  if (moved <= kStill * chain.robot().max_length) return false;
+  if (!chain.touching(trial_.active) && !chain.touching(present_.active)) return false;
+  if (steady_) {
+    double turned = 0, missed = 0;
+    for (std::size_t i = 0; i < predicted_.size(); ++i)
+      for (int k = 0; k < Model::kControl; ++k) {
+        turned = std::max(turned, std::abs(predicted_[i][k] - present_.controls[i][k]));
+        missed = std::max(missed, std::abs(trial_.controls[i][k] - predicted_[i][k]));
+      }
+    if (missed <= kOffTrend * turned) return false;
+  }
+  if (command.length == present_.command.length) {
+    double exchanged = 0;
+    for (int k = 0; k < kCables; ++k)
+      exchanged += std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
+                   std::max(tensions_[k], trial_tensions_[k]);
+    if (std::abs(lost(command)) * chain.stiffness() <= kLost * exchanged) return false;
+  }
+  return !returns();
+}
+
+// Whether the way back from `trial_` leads to `present_`. Leaves the chain evaluated at `trial_`.
+template <class Model>
+bool Branch<Model>::returns() {
+  back_ = trial_;
+  back_.command = present_.command;
+  const Verdict verdict = newton_.solve(back_);
+  iterations += verdict.iterations;
+  double apart = verdict.converged ? 0 : HUGE_VAL, moved = 0;
+  for (std::size_t i = 0; i < back_.controls.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k) {
+      apart = std::max(apart, std::abs(back_.controls[i][k] - present_.controls[i][k]));
+      moved = std::max(moved, std::abs(trial_.controls[i][k] - present_.controls[i][k]));
+    }
+  newton_.chain.evaluate(trial_);
+  newton_.chain.reduced_gradient(trial_.active);
+  return apart <= kReturned * moved;
 }
 
 // Whether a command pulls a cable.
@@ -349,7 +469,7 @@ bool Branch<Model>::finish() {
   trial_ = present_;
   const Verdict verdict = newton_.solve(trial_);
   iterations += verdict.iterations;
-  if (!verdict.converged || newton_.chain.energy() > energy || !passable(kDescentMove)) return false;
+  if (!verdict.converged || newton_.chain.energy() > energy || !close_by()) return false;
   std::swap(present_, trial_);
   remember();
   return true;
@@ -363,7 +483,7 @@ bool Branch<Model>::descend(bool& moved) {
     trial_ = present_;
     ++iterations;
     if (newton_.descend(trial_, cap, moved).converged) return true;
-    if (!moved || passable(kDescentMove)) return false;
+    if (!moved || close_by()) return false;
   }
   moved = false;
   return false;
@@ -375,7 +495,14 @@ bool Branch<Model>::depart(const Command& command, bool holding) {
   trial_ = present_;
   trial_.command = command;
   if (!holding) trial_.active.count = 0;
-  return newton_.restore(trial_) && passable(kDescentMove);
+  return newton_.restore(trial_) && close_by();
+}
+
+// Whether an iterate of the descent is near the last one, and nothing was passed through on the way.
+template <class Model>
+bool Branch<Model>::close_by() const {
+  const double moved = farthest();
+  return moved <= kDescentMove * newton_.chain.robot().max_length && passable(moved);
 }
 
 // The branch ends within the smallest step: descend from its end, feasible and slowly, to where the robot goes.
@@ -397,7 +524,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
   };
 
   bool moved = newton_.measure(present_) && (depart(command, true) || depart(command, false));
-  for (int i = 0; i < kDescentIterations && moved; ++i) {
+  for (int i = 0; i < kDescentIterations && moved && !spent(); ++i) {
     std::swap(present_, trial_);
     remember();
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && finish();
@@ -409,7 +536,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     double farthest = 0;
     for (std::size_t k = 0; k < points_.size(); ++k)
       farthest = std::max(farthest, norm(minus(points_[k], start_points[k])));
-    return farthest > kMoveOffset ? End::kSnapped : End::kPassed;
+    return farthest > kStill * newton_.chain.robot().max_length ? End::kSnapped : End::kPassed;
   }
   return undo(End::kBlocked);
 }
@@ -423,12 +550,13 @@ bool Branch<Model>::at_limit() const {
 // shape.
 template <class Model>
 Branch<Model>::Command Branch<Model>::goal(Command wanted) const {
-  if (Model::kSliding || pull(wanted.cables) >= kPretension || !newton_.chain.touching(present_.active)) return wanted;
+  const double pretension = kPretension * newton_.chain.robot().offset;
+  if (Model::kSliding || pull(wanted.cables) >= pretension || !newton_.chain.touching(present_.active)) return wanted;
   int taut = 0;
   for (int k = 1; k < kCables; ++k)
     if (std::abs(present_.command.cables[k]) > std::abs(present_.command.cables[taut])) taut = k;
   const double present = present_.command.cables[taut];
-  const double least = std::min(std::abs(present), kPretension);
+  const double least = std::min(std::abs(present), pretension);
   if (std::abs(wanted.cables[taut]) < least) wanted.cables[taut] = std::copysign(least, present);
   return wanted;
 }
@@ -456,7 +584,7 @@ void Branch<Model>::yield(Command& wanted) const {
   for (int k = 0; k < kCables; ++k) {
     const double present = present_.command.cables[k];
     if (tensions_[k] > newton_.chain.robot().max_tension)
-      wanted.cables[k] = std::copysign(std::max(std::abs(present) - kYield, 0.0), present);
+      wanted.cables[k] = std::copysign(std::max(std::abs(present) - kYield * newton_.chain.robot().offset, 0.0), present);
   }
 }
 
@@ -467,14 +595,14 @@ Status Branch<Model>::follow(const Command& target) {
   double step = kLargestStep;
   bool refined = false;  // the last attempt was rejected: do not grow again at once
   const int steps = kSubSteps + static_cast<int>(2 * apart(present_.command, target) / kLargestStep);
-  for (int sub = 0, ends = 0; sub < steps && ends < kBranchEnds; ++sub) {
+  for (int sub = 0, ends = 0; sub < steps && ends < kBranchEnds && !spent(); ++sub) {
     const Command goal = this->goal(wanted);
     const double remaining = apart(present_.command, goal);
     if (remaining == 0) {
       // A release may end in a snap to more tension than the motor holds: it yields until it holds again.
       if (highest(tensions_) <= newton_.chain.robot().max_tension || pull(present_.command.cables) == 0) return reached;
       yield(wanted);
-      reached = Status::kStalled;
+      reached = std::max(reached, Status::kStalled);
       continue;
     }
     bool stalled = kCables == 1 && at_limit() && pulls(goal) && goal.length == present_.command.length;
@@ -493,9 +621,9 @@ Status Branch<Model>::follow(const Command& target) {
       refined = true;
     } else {
       const End end = pass_end(next);
-      if (end == End::kBlocked) return Status::kJammed;
+      if (end == End::kBlocked) return Status::kBlocked;
       stalled = end == End::kOverTension;
-      if (end == End::kSnapped) reached = Status::kSnapped;
+      if (end == End::kSnapped) reached = std::max(reached, Status::kSnapped);
       step = 2 * kSmallestStep;
       refined = false;
       ++ends;
@@ -505,7 +633,7 @@ Status Branch<Model>::follow(const Command& target) {
       if (!hold(wanted)) return reached;
     }
   }
-  return Status::kJammed;
+  return Status::kGaveUp;
 }
 
 // Tensions of the free robot where it first touches, between where the step began and where it is, each with the sign of
@@ -515,7 +643,7 @@ Branch<Model>::Tensions Branch<Model>::first_tensions(const Command& start) {
   const auto clear = [&](double part) {
     trial_.command = between(start, present_.command, part);
     newton_.chain.relax(trial_);
-    return newton_.chain.evaluate(trial_) && newton_.chain.violation() <= kFeasibility;
+    return newton_.chain.evaluate(trial_) && newton_.chain.violation() <= kFeasibility * newton_.chain.robot().max_length;
   };
   double low = 0, high = 1;
   if (!clear(high))
@@ -534,6 +662,7 @@ Branch<Model>::Tensions Branch<Model>::first_tensions(const Command& start) {
 template <class Model>
 Status Branch<Model>::follow(const double* from, const double* target, double* to) {
   iterations = 0;
+  work_before_ = newton_.work();
   load(from);
   const Command start = present_.command;
   Command wanted;
@@ -552,13 +681,35 @@ Status Branch<Model>::follow(const double* from, const double* target, double* t
   }
   settle();
   store(to);
+  factorizations = newton_.work() - work_before_;
   return status;
+}
+
+template <class Model>
+Optimality Branch<Model>::optimality(const double* block) {
+  load(block);
+  settle();
+  Chain& chain = newton_.chain;
+  Optimality found;
+  const double length = chain.robot().max_length;
+  for (const auto& g : chain.gradient())
+    for (const double slope : g.v) found.stationarity = std::max(found.stationarity, std::abs(slope));
+  for (const auto& g : chain.mount_gradient())
+    found.stationarity = std::max(found.stationarity, length / chain.robot().segments * norm(g));
+  found.gap = chain.violation() / length;
+  for (int j = 0; j < present_.active.count; ++j) {
+    const double gap = std::abs(chain.gaps()[present_.active.contact[j]]);
+    found.gap = std::max(found.gap, gap / length);
+    found.complementarity = std::max(found.complementarity, gap * present_.active.multiplier[j]);
+  }
+  return found;
 }
 
 template <class Model>
 bool Branch<Model>::reaches(double force, int obstacle, const double* direction, double increment, double limit,
                             double length, double* reached) {
   std::fill_n(reached, kSpace, 0.0);
+  if (!(increment > 0)) return false;
   Command command{{}, length};
   std::vector<double> rest(block_size());
   rest[kCables] = length;
@@ -570,6 +721,7 @@ bool Branch<Model>::reaches(double force, int obstacle, const double* direction,
   const int obstacles = static_cast<int>(newton_.chain.obstacles().size());
   for (int i = 1; i * increment < limit; ++i) {
     for (int k = 0; k < kCables; ++k) command.cables[k] = i * increment * direction[k];
+    work_before_ = newton_.work();
     if (follow(command) != Status::kConverged) return false;
     settle();
     Position total{};

@@ -11,7 +11,15 @@
 
 namespace ccr {
 
-enum class Status { kConverged, kSnapped, kStalled, kJammed, kFailed };
+// How a step ended; of several, the last one.
+enum class Status { kConverged, kSnapped, kStalled, kBlocked, kGaveUp };
+
+// How far an equilibrium is from meeting its conditions, without units: the largest slope of the Lagrangian in a control
+// [rad²], the largest gap that is violated, or open and active, over the robot's length, and the largest product of a
+// multiplier and its gap [rad²].
+struct Optimality {
+  double stationarity = 0, gap = 0, complementarity = 0;
+};
 
 // What is the same for all models of a robot in the plane or in space.
 template <int D>
@@ -41,8 +49,14 @@ class Follower {
   virtual bool reaches(double force, int obstacle, const double* direction, double increment, double limit, double length,
                        double* reached) = 0;
 
-  int iterations = 0;                    // of Newton's method in the last follow
-  std::vector<double>* trace = nullptr;  // when set, receives the three numbers of every node at every accepted shape
+  // How well the equilibrium in a block meets its conditions, computed anew from its coordinates and multipliers.
+  virtual Optimality optimality(const double* block) = 0;
+
+  int iterations = 0;      // of Newton's method in the last follow
+  int factorizations = 0;  // of its Hessian
+  // When set, receives of every accepted shape the three numbers of every node, the points that can touch, and the
+  // displacements of the obstacles.
+  std::vector<double>* trace = nullptr;
 };
 
 // How an equilibrium has changed per millimetre of cable, to start the search for the next one; zero where it is free, or
@@ -71,6 +85,7 @@ class Branch : public Follower<Model::kSpace> {
   using Tensions = Vec<kCables>;
 
   using Follower<kSpace>::iterations;
+  using Follower<kSpace>::factorizations;
   using Follower<kSpace>::trace;
 
   Branch(const Robot& robot, int obstacles);
@@ -80,6 +95,7 @@ class Branch : public Follower<Model::kSpace> {
   Status follow(const double* from, const double* target, double* to) override;
   bool reaches(double force, int obstacle, const double* direction, double increment, double limit, double length,
                double* reached) override;
+  Optimality optimality(const double* block) override;
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension };
@@ -92,7 +108,12 @@ class Branch : public Follower<Model::kSpace> {
   Command goal(Command wanted) const;
   bool hold(Command& wanted) const;
   void yield(Command& wanted) const;
+  double apart(const Command& a, const Command& b) const;
+  bool spent() const { return newton_.work() - work_before_ > limits::kWork; }
   Move attempt(const Command& command);
+  double lost(const Command& command) const;
+  bool jumped(const Command& command, double moved);
+  bool returns();
   bool attempt_free();
   bool approach_limit();
   bool at_limit() const;
@@ -102,7 +123,10 @@ class Branch : public Follower<Model::kSpace> {
   bool finish();
   bool depart(const Command& command, bool holding);
   bool descend(bool& moved);
-  bool passable(double allowed) const;
+  double farthest() const;
+  bool close_by() const;
+  bool passable(double moved) const;
+  bool unswept(const Obstacle<kSpace>& obstacle, int mount, double moved) const;
   void accept();
   void learn();
   void forget();
@@ -113,6 +137,11 @@ class Branch : public Follower<Model::kSpace> {
   Newton<Model> newton_;
   Iterate present_, trial_;
   Trend<Model> trend_;  // of `present_`
+  Iterate back_;          // scratch of `returns`
+  std::vector<typename Model::Control> predicted_;  // controls of `trial_` along the trend
+  bool steady_ = false;   // whether there is a trend
+  int work_before_ = 0;   // the step began
+  double energy_ = 0;     // at `present_`
   Tensions tensions_{}, trial_tensions_{};
   Tensions onset_{};      // tensions where the present contact began
   bool touched_ = false;  // at the start

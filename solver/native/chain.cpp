@@ -36,7 +36,7 @@ Chain<Model>::Chain(const Robot& robot, int obstacles)
       clear_(obstacles),
       nodes_(robot.segments + 1),
       points_(robot.points()),
-      gaps_(obstacles * points_.size() + Model::kSliding, std::numeric_limits<double>::infinity()),
+      gaps_(obstacles * points_.size() + Model::kSliding * (1 + 2 * robot.segments), std::numeric_limits<double>::infinity()),
       mount_of_(obstacles, -1),
       pulls_(robot.segments + 1) {
   near_.reserve(gaps_.size());
@@ -46,7 +46,7 @@ Chain<Model>::Chain(const Robot& robot, int obstacles)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line});
     reach_ = std::max(reach_, norm(line));
   }
-  reach_ += limits::kReach + (robot.between > 0 ? robot.max_length / robot.segments : 0);
+  reach_ += limits::kReach * robot.max_length + (robot.between > 0 ? robot.max_length / robot.segments : 0);
 }
 
 template <class Model>
@@ -86,23 +86,27 @@ bool Chain<Model>::evaluate(const Iterate& at) {
   for (int i = 0; i <= robot_.segments; ++i)
     for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
   place_points<Model>(robot_, nodes_, frames(), points_);
-  if constexpr (Model::kSliding)
-    measure_gaps(model_.slack(at.command));
-  else
-    measure_gaps(0);
+  measure_gaps();
+  if constexpr (Model::kSliding) measure_limits(at.command);
   return true;
 }
 
 template <class Model>
 void Chain<Model>::load_springs(const std::vector<Position>& mounts) {
   displacements_ = mounts;
-  energy_ = objective();
-  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
-    const int mount = mount_of_[j];
-    if (mount < 0) continue;
-    for (int k = 0; k < kSpace * kSpace; ++k) springs_[mount][k] = obstacles_[j].stiffness[k] / stiffness();
-    energy_ += dot(mounts[mount], times(springs_[mount], mounts[mount])) / 2;
-  }
+  for (std::size_t j = 0; j < obstacles_.size(); ++j)
+    if (const int mount = mount_of_[j]; mount >= 0)
+      for (int k = 0; k < kSpace * kSpace; ++k) springs_[mount][k] = obstacles_[j].stiffness[k] / stiffness();
+  energy_ = objective() + spring_energy(mounts, model_.segment_length() * robot_.segments);
+}
+
+template <class Model>
+double Chain<Model>::spring_energy(const std::vector<Position>& mounts, double length) const {
+  double energy = 0;
+  for (std::size_t j = 0; j < obstacles_.size(); ++j)
+    if (const int mount = mount_of_[j]; mount >= 0)
+      energy += dot(mounts[mount], times(obstacles_[j].stiffness, mounts[mount])) / 2;
+  return energy / robot_.stiffness(length);
 }
 
 template <class Model>
@@ -113,7 +117,7 @@ void Chain<Model>::relax(Iterate& at) {
   if constexpr (Model::kSliding)
     if (at.command.cables[0] > 0) {
       control = model_.relaxed(at.command);
-      at.active.contact[0] = contacts();
+      at.active.contact[0] = slack();
       at.active.multiplier[0] = model_.relaxed_push();
       at.active.count = 1;
     }
@@ -122,7 +126,7 @@ void Chain<Model>::relax(Iterate& at) {
 
 // Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
 template <class Model>
-void Chain<Model>::measure_gaps(double slack) {
+void Chain<Model>::measure_gaps() {
   const int n = robot_.segments, stride = robot_.between + 1;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
@@ -151,9 +155,22 @@ void Chain<Model>::measure_gaps(double slack) {
         }
     }
   }
-  if constexpr (Model::kSliding) {
-    gaps_[contacts()] = slack;
-    near_.push_back(contacts());
+}
+
+template <class Model>
+void Chain<Model>::measure_limits(const Command& command) requires(Model::kSliding) {
+  const auto add = [this](int contact, double gap) {
+    gaps_[contact] = gap;
+    near_.push_back(contact);
+  };
+  add(slack(), model_.slack(command));
+  const double close = limits::kDisksClose * (model_.segment_length() - robot_.disk_thickness) / robot_.disk_radius;
+  if (model_.widest <= close) return;
+  for (int i = 0; i < robot_.segments; ++i) {
+    const double angle = states()[i][2] - states()[i + 1][2];
+    if (std::abs(angle) <= close) continue;
+    const int contact = disks() + 2 * i + (angle < 0);
+    add(contact, disk_gap(contact).value);
   }
 }
 
@@ -181,8 +198,13 @@ Gap<Chain<Model>::kSpace> Chain<Model>::gap(int contact) const {
 
 template <class Model>
 Chain<Model>::Slope Chain<Model>::slope(int contact) const {
-  if constexpr (Model::kSliding)
-    if (contact == contacts()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
+  if constexpr (Model::kSliding) {
+    if (contact == slack()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
+    if (contact > slack()) {  // in the angle between two nodes
+      const double slope = disk_gap(contact).slope;
+      return {{(contact - disks()) / 2, true, {{0, 0, slope, 0}}, {{0, 0, -slope, 0}}}, -1, {}};
+    }
+  }
   const Position normal = gap(contact).slope;
   return {force(contact, normal), mount(contact), normal};
 }
@@ -204,14 +226,16 @@ Chain<Model>::Force Chain<Model>::force(int contact, const Position& on_point) c
 
 template <class Model>
 double Chain<Model>::lever_arm(int contact) const {
-  if (contact == contacts()) return robot_.offset * robot_.segments;
+  if (contact == slack()) return robot_.offset * robot_.segments;
+  if (contact > slack()) return robot_.disk_radius;
   const Site& site = this->site(contact);
   return model_.segment_length() * (site.node + (site.fraction > 0));
 }
 
 template <class Model>
 bool Chain<Model>::touching(const ActiveSet& active) const {
-  return active.count > 1 || (active.count == 1 && active.contact[0] < contacts());
+  const auto begin = active.contact.begin();
+  return std::any_of(begin, begin + active.count, [this](int contact) { return contact < contacts(); });
 }
 
 template <class Model>
@@ -248,7 +272,9 @@ void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
   model_.curvature(system);
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
-    if (contact == contacts()) continue;  // linear in the state
+    if constexpr (Model::kSliding)
+      if (contact > slack()) add_disk_curvature(contact, -active.multiplier[j], system);
+    if (contact >= contacts()) continue;  // slack is linear in the state
     const Gap<kSpace> gap = this->gap(contact);
     const Site& site = this->site(contact);
     const double scale = -active.multiplier[j];
@@ -283,11 +309,22 @@ void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
 }
 
 template <class Model>
+void Chain<Model>::add_disk_curvature(int contact, double scale, System& system) const requires(Model::kSliding) {
+  const int node = (contact - disks()) / 2;
+  const double curvature = scale * disk_gap(contact).curvature;
+  Mat<kState, kState> cross;
+  cross(2, 2) = -curvature;
+  system.node_hessian[node](2, 2) += curvature;
+  system.node_hessian[node + 1](2, 2) += curvature;
+  system.couple(node, cross);
+}
+
+template <class Model>
 Chain<Model>::Tensions Chain<Model>::tensions(const ActiveSet& active) const {
   Tensions tensions = model_.pull_slopes();
   if constexpr (Model::kSliding)
     for (int j = 0; j < active.count; ++j)
-      if (active.contact[j] == contacts()) tensions[0] = active.multiplier[j];
+      if (active.contact[j] == slack()) tensions[0] = active.multiplier[j];
   for (double& tension : tensions.v) tension *= stiffness();
   return tensions;
 }
@@ -296,7 +333,7 @@ template <class Model>
 Chain<Model>::Position Chain<Model>::push(const ActiveSet& active, int obstacle) const {
   Position force{};
   for (int j = 0; j < active.count; ++j) {
-    if (active.contact[j] == contacts() || active.contact[j] / static_cast<int>(points_.size()) != obstacle) continue;
+    if (active.contact[j] >= contacts() || active.contact[j] / static_cast<int>(points_.size()) != obstacle) continue;
     const Gap<kSpace> gap = this->gap(active.contact[j]);
     for (int k = 0; k < kSpace; ++k) force[k] += stiffness() * active.multiplier[j] * gap.slope[k];
   }

@@ -12,8 +12,8 @@
 
 namespace ccr {
 
-// Contacts that carry a multiplier. A contact is (obstacle * lines + line) * positions + position; the one after the last
-// is a sliding cable, whose gap is its slack.
+// Contacts that carry a multiplier. A contact is (obstacle * lines + line) * positions + position. After the last of these
+// come, with a sliding cable, its slack, and of each segment where its disks meet on the side of the cable and opposite.
 struct ActiveSet {
   int count = 0;
   std::array<int, limits::kMaxActive> contact;
@@ -97,11 +97,13 @@ class Chain {
 
   const Robot& robot() const { return robot_; }
   std::span<const Obstacle> obstacles() const { return obstacles_; }
+  // Contacts with obstacles, then the slack of a sliding cable, then the first of the disks that meet.
   int contacts() const { return static_cast<int>(mount_of_.size() * points_.size()); }
   bool touching(const ActiveSet& active) const;  // any obstacle
 
   double objective() const { return model_.objective; }
   double energy() const { return energy_; }  // the objective and that of the springs, over the stiffness [rad^2]
+  double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the stiffness [rad^2]
   double violation() const;  // largest -gap, at least 0
   double tolerance() const;  // of the slope of the Lagrangian
   double stiffness() const { return robot_.stiffness(model_.segment_length() * robot_.segments); }
@@ -117,10 +119,12 @@ class Chain {
   Force force(int contact, const Position& on_point) const;   // on the nodes, of one on the point
   Slope slope(int contact) const;
   int mounts() const { return static_cast<int>(springs_.size()); }
-  int mount(int contact) const { return contact == contacts() ? -1 : mount_of_[contact / points_.size()]; }
+  int mount(int contact) const { return contact >= contacts() ? -1 : mount_of_[contact / points_.size()]; }
   int mount_of(int obstacle) const { return mount_of_[obstacle]; }
   const Mat<kSpace, kSpace>& spring(int mount) const { return springs_[mount]; }  // its stiffness over the robot's
   const std::vector<Position>& mount_gradient() const { return mount_gradient_; }
+  int slack() const { return contacts(); }
+  int disks() const { return contacts() + 1; }
   double lever_arm(int contact) const;  // of its motion per unit of a control, about [mm]
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
@@ -137,8 +141,13 @@ class Chain {
   const Site& site(int contact) const { return sites_[contact % points_.size()]; }
   Position lever(const Site& site, int node) const { return Model::lever(model_.frames[node], site.line); }
   Position moved(int obstacle) const { return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]]; }
+  void add_disk_curvature(int contact, double scale, System& system) const requires(Model::kSliding);
   void load_springs(const std::vector<Position>& mounts);
-  void measure_gaps(double slack);
+  void measure_gaps();
+  void measure_limits(const Command& command) requires(Model::kSliding);
+  DiskGap disk_gap(int contact) const requires(Model::kSliding) {
+    return model_.disk_gap((contact - disks()) / 2, (contact - disks()) % 2 == 0 ? 1 : -1);
+  }
 
   Robot robot_;
   Model model_;

@@ -169,7 +169,7 @@ int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, 
   }
   reach += shift;
   int worst = -1;
-  double lowest = -kFeasibility / 2;
+  double lowest = -kFeasibility * chain.robot().max_length / 2;
   for (const int c : chain.near()) {
     const double gap = chain.gaps()[c];
     if (gap > 2 * reach && c < chain.contacts()) continue;

@@ -104,6 +104,7 @@ void Hessian<Model>::shape_mounts(const Chain& chain, const ActiveSet& active) {
 
 template <class Model>
 bool Hessian<Model>::factor(double damping) {
+  ++factorizations;
   return system_.factor(damping) && (mount_hessian_.empty() || factor_mounts(damping / (arm_ * arm_)));
 }
 

@@ -42,6 +42,7 @@ class Hessian {
   // H⁻¹ times the slope of a gap, or -H⁻¹ times that of the Lagrangian.
   void respond(const Chain& chain, std::span<const Load> loads);
 
+  int factorizations = 0;  // so far
   double penalty(int j) const { return penalty_[j]; }  // on an active gap, in their order
   double steepest() const { return steepest_; }        // largest curvature of a control
 

@@ -24,7 +24,9 @@ void Newton<Model>::enter(std::span<const Obstacle<Model::kSpace>> obstacles) {
   chain.enter(obstacles);
   const int segments = chain.robot().segments, mounts = chain.mounts();
   if (step_.mounts.size() == static_cast<std::size_t>(mounts)) return;
+  const int work = this->work();
   hessian_ = Hessian<Model>(segments, mounts);
+  hessian_.factorizations = work;
   contacts_ = Contacts<Model>(segments, mounts);
   step_ = correction_ = Direction<Model>(segments, mounts);
   trial_.mounts.resize(mounts);
@@ -197,7 +199,7 @@ template <class Model>
 ActiveSet Newton<Model>::closed(const ActiveSet& active) const {
   ActiveSet kept;
   for (int j = 0; j < active.count; ++j) {
-    if (chain.gaps()[active.contact[j]] > kFeasibility) continue;
+    if (chain.gaps()[active.contact[j]] > kFeasibility * chain.robot().max_length) continue;
     kept.contact[kept.count] = active.contact[j];
     kept.multiplier[kept.count++] = active.multiplier[j];
   }
@@ -209,7 +211,7 @@ template <class Model>
 bool Newton<Model>::on_surface(const ActiveSet& active, double tolerance) const {
   double farthest = chain.violation();
   for (int j = 0; j < active.count; ++j) farthest = std::max(farthest, chain.gaps()[active.contact[j]]);
-  return farthest <= tolerance;
+  return farthest <= tolerance * chain.robot().max_length;
 }
 
 template <class Model>
@@ -225,7 +227,7 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   // Energy may rise by what it costs to close gaps that are open by as little as is not told from closed.
   const double before = chain.energy();
   double allowed = before + kEnergyRoundoff * before;
-  for (int j = 0; j < target.count; ++j) allowed += 2 * kDescentFeasibility * target.multiplier[j];
+  for (int j = 0; j < target.count; ++j) allowed += 2 * kDescentFeasibility * chain.robot().max_length * target.multiplier[j];
   const double whole = std::min(1.0, largest / size(step_));
   trial_.command = at.command;
   const ActiveSet touching = closed(target);

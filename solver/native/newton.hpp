@@ -36,6 +36,9 @@ class Newton {
   // Smallest motion that closes the active gaps exactly and meets every other; false when there is none nearby.
   bool restore(Iterate& at);
 
+  // Factorisations of the Hessian so far, which nearly all of the work goes with.
+  int work() const { return hessian_.factorizations; }
+
   Chain<Model> chain;  // evaluated at the last iterate
 
  private:

@@ -80,28 +80,10 @@ double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> point
   return std::sqrt(square) - obstacle.radius;
 }
 
-template <int D>
-bool passes(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to) {
-  const Position<D> path = minus(to, from);
-  const double length = norm(path);
-  if (length <= limits::kSweepStride * obstacle.fineness || clearance(obstacle, std::span(&from, 1)) > length)
-    return true;
-  const int pieces = static_cast<int>(std::ceil(length / (limits::kSweepStride * obstacle.fineness)));
-  for (int k = 1; k < pieces; ++k) {
-    Position<D> between = from;
-    for (int i = 0; i < D; ++i) between[i] += static_cast<double>(k) / pieces * path[i];
-    double gap;
-    measure_gaps(obstacle, std::span<const Position<D>>(&between, 1), Position<D>{}, &gap);
-    if (gap < -limits::kSweepDepth * obstacle.fineness) return false;
-  }
-  return true;
-}
-
 #define CCR_INSTANTIATE(D)                                                                                            \
   template Gap<D> measure_gap(const Obstacle<D>&, const Position<D>&);                                                \
   template void measure_gaps(const Obstacle<D>&, std::span<const Position<D>>, const Position<D>&, double*);          \
-  template double clearance(const Obstacle<D>&, std::span<const Position<D>>);                                        \
-  template bool passes(const Obstacle<D>&, const Position<D>&, const Position<D>&);
+  template double clearance(const Obstacle<D>&, std::span<const Position<D>>);
 CCR_INSTANTIATE(2)
 CCR_INSTANTIATE(3)
 #undef CCR_INSTANTIATE

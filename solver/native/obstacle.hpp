@@ -30,6 +30,8 @@ struct Obstacle {
   Position<D> center;                    // of a ball that holds it
   double radius;                         // of that ball; infinite for a wall
   double fineness;                       // smallest radius of its surface; infinite for a wall
+  double inradius;                       // of the largest ball inside it; infinite for a wall
+  std::vector<Position<D>> outline;      // points of its surface, where its gap is no distance; else none
   std::vector<unsigned char> touchable;  // (lines, positions): whether a point can touch it
   bool everywhere;                       // whether all of them can
   bool mounted;                          // on a spring; fixed otherwise
@@ -73,9 +75,5 @@ double clearance_beyond(const Obstacle<D>& obstacle, const Position<D>& point, d
   const double square = dot(offset, offset), within = obstacle.radius + reach;
   return square <= within * within ? 0.0 : std::sqrt(square) - within;
 }
-
-// Whether the straight path from one point outside to another stays out of the obstacle, but for its very rim.
-template <int D>
-bool passes(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to);
 
 }  // namespace ccr

@@ -5,6 +5,10 @@
 
 #include "limits.hpp"
 
+// The generated law of the disks, inlined here.
+#define CASADI_SYMBOL_EXPORT static inline
+#include "disk_laws.c"
+
 namespace ccr {
 
 namespace {
@@ -38,11 +42,10 @@ bool Planar<Cable>::evaluate(const Command<1>& command, const std::vector<Contro
   const int n = robot_.segments;
   pull_ = command.cables[0] / n;
   length_ = command.length / n;
-  objective = steepest = 0;
+  objective = steepest = widest = 0;
   Cable::bend(n, controls[0].v.data(), pull_, length_, robot_.offset, bends_);
   states[0] = {};
   frames[0] = {{1, 0}};
-  double widest = 0;
   for (int i = 0; i < n; ++i) {
     const auto bend = bends_[i];
     const double c = frames[i][0], s = frames[i][1];  // of the lower disk
@@ -116,6 +119,17 @@ Vec<1> Planar<Cable>::pull_slopes() const {
     }
   slope[0] /= robot_.segments;
   return slope;
+}
+
+template <class Cable>
+DiskGap Planar<Cable>::disk_gap(int segment, int side) const requires(kSliding) {
+  const double angle = side * bends_[segment].angle;
+  const double* in[] = {&angle, &length_, &robot_.disk_radius, &robot_.disk_thickness};
+  DiskGap gap;
+  double* out[] = {&gap.value};
+  ccr_disk_gap(in, out, nullptr, nullptr, 0);
+  gap.slope *= side;
+  return gap;
 }
 
 template <class Cable>

@@ -69,6 +69,7 @@ class Planar {
   Vec<kTip> free_slopes(const Command<1>& command);
 
   double slack(const Command<1>& command) const requires(kSliding) { return states.back()[kState - 1] - command.cables[0]; }
+  DiskGap disk_gap(int segment, int side) const requires(kSliding);  // 1 for the cable's side, -1 for the other
   double free_turn() const { return pull_ / robot_.offset; }  // of a segment that nothing touches, about
   double segment_length() const { return length_; }
 
@@ -77,6 +78,7 @@ class Planar {
   std::vector<Control> gradient;
   double objective = 0;
   double steepest = 0;  // largest slope of the objective alone
+  double widest = 0;    // largest angle between consecutive disks
 
  private:
   Robot robot_;

@@ -60,7 +60,7 @@ class Sphere(SpatialObstacle):
     @property
     def extent(self) -> Extent:
         """The ball itself."""
-        return Extent(self.center, self.radius, 2 * self.radius, self.radius)
+        return Extent(self.center, self.radius, self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
         """Points of the sphere, ``(u, v, 3)`` [mm]."""
@@ -140,7 +140,7 @@ class Capsule(SpatialObstacle):
     def extent(self) -> Extent:
         """The ball about the middle of the line."""
         center, half = _middle(self.start, self.end)
-        return Extent(center, half + self.radius, 2 * self.radius, self.radius)
+        return Extent(center, half + self.radius, self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(u, v, 3)`` [mm]."""
@@ -192,7 +192,7 @@ class Cylinder(SpatialObstacle):
     def extent(self) -> Extent:
         """The ball about its middle."""
         center, half = _middle(self.start, self.end)
-        return Extent(center, math.hypot(half, self.radius), 2 * min(half, self.radius), self.edge)
+        return Extent(center, math.hypot(half, self.radius), min(half, self.radius), self.edge)
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(u, v, 3)`` [mm]."""
@@ -255,7 +255,7 @@ class Box(SpatialObstacle):
     @property
     def extent(self) -> Extent:
         """The ball about its centre."""
-        return Extent(self.center, math.hypot(*self.sizes) / 2, min(self.sizes), self.edge)
+        return Extent(self.center, math.hypot(*self.sizes) / 2, min(self.sizes) / 2, self.edge)
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(u, v, 3)`` [mm]."""

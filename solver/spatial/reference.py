@@ -9,7 +9,7 @@ import numpy as np
 from solver.geometry import touchable_points
 from solver.reference import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
 from solver.scene import Scene
-from solver.solve import check_clear, check_width
+from solver.solve import check_clear, check_core
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
@@ -20,7 +20,7 @@ from solver.status import Status
 class SpatialReferenceSolver:
     """Follows the same equilibria as :class:`solver.spatial.SpatialSolver`, by the problem as the paper writes it.
 
-    Only a branch is followed: where it ends in a snap or a jam, a step is ``FAILED``. Tensions are reported and not
+    Only a branch is followed: where it ends in a snap or a jam, a step is ``GAVE_UP``. Tensions are reported and not
     limited.
 
     Args:
@@ -34,7 +34,7 @@ class SpatialReferenceSolver:
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
         self.robot, self.scene = robot, scene
         check_space(scene)
-        check_width(robot, scene)
+        check_core(robot, scene)
         self._touchable = touchable_points(robot, scene)
         problem = spatial_problem(robot, scene.laws, scene.mounted)
         self._equalities = problem.equalities.shape[0]
@@ -76,7 +76,7 @@ class SpatialReferenceSolver:
             elif largest > SMALLEST_STEP:
                 largest /= 2
             else:
-                return SpatialEquilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.FAILED, 0)
+                return SpatialEquilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.GAVE_UP, 0)
         return now
 
     def _solve(self, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialEquilibrium | None:

@@ -115,9 +115,15 @@ class SpatialRobot:
         return self.length_mm / self.segments
 
     @property
-    def spacing_mm(self) -> float:
-        """Distance between neighbouring points of the backbone that can touch [mm]."""
-        return self.segment_mm / (self.between + 1)
+    def edges_mm(self) -> tuple[float, ...]:
+        """Longest distance there can be between neighbouring points of each line [mm].
+
+        A cable turns its segment by no more than a shear up to where it has no more length to give.
+        """
+        segment, shared = self.segment_mm, self.cable_limit_mm / self.segments
+        turned = math.sqrt(segment**2 - (segment - shared) ** 2)
+        stretched = np.abs(self.line_weights).sum(axis=1) * turned
+        return tuple(((segment + stretched) / (self.between + 1)).tolist())
 
     @property
     def stiffness(self) -> float:

@@ -6,9 +6,10 @@ import numpy as np
 
 from solver import _kernel
 from solver.batch import BaseBatch
+from solver.equilibrium import Optimality
 from solver.layout import SPACE, Layout, Model
 from solver.scene import Scene
-from solver.solve import check_clear, check_origin, check_width, scene_arrays
+from solver.solve import Trace, check_clear, check_core, check_origin, read_trace, scene_arrays
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout
 from solver.spatial.robot import SpatialRobot
 from solver.status import Status
@@ -32,7 +33,7 @@ class SpatialSolver:
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
         self.robot, self.scene = robot, scene
         check_space(scene)
-        check_width(robot, scene)
+        check_core(robot, scene)
         self._kernel = _kernel.SpatialKernel(kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
         straight[spatial_layout(robot, len(scene)).length_at] = robot.length_mm
@@ -62,21 +63,30 @@ class SpatialSolver:
         """
         return self._follow(equilibrium.block, check_cables(self.robot, self.scene, equilibrium, cables_mm))
 
-    def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> np.ndarray:
-        """Nodes of every shape accepted on the way of :meth:`step`, from the present one on, ``(k, n+1, 3)`` [mm].
+    def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> Trace:
+        """Every shape accepted on the way of :meth:`step`, from the present one on.
 
         Raises:
             ValueError: As :meth:`step`.
         """
         cables = check_cables(self.robot, self.scene, equilibrium, cables_mm)
         shapes = self._kernel.trace(equilibrium.block, (*cables, self.robot.length_mm))
-        return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
+        return read_trace(shapes, self.robot, self.scene, 3)
+
+    def optimality(self, equilibrium: SpatialEquilibrium) -> Optimality:
+        """How well an equilibrium meets its conditions, computed anew by the kernel.
+
+        Raises:
+            ValueError: If the equilibrium is another robot's or scene's.
+        """
+        check_origin(self.robot, self.scene, equilibrium)
+        return Optimality(*self._kernel.optimality(equilibrium.block))
 
     def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
         reached = np.empty_like(block)
         first, second = cables.tolist()
-        status, iterations = self._kernel.step(block, first, second, self.robot.length_mm, reached)
-        return SpatialEquilibrium(self.robot, self.scene, reached, Status(status), iterations)
+        status, *work = self._kernel.step(block, first, second, self.robot.length_mm, reached)
+        return SpatialEquilibrium(self.robot, self.scene, reached, Status(status), *work)
 
 
 class SpatialBatchSolver(BaseBatch):
@@ -93,8 +103,8 @@ class SpatialBatchSolver(BaseBatch):
     def _kernel_scene(self, scene: Scene) -> _kernel.SpatialScene:
         return kernel_scene(self.robot, scene)
 
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, iterations: int) -> SpatialEquilibrium:
-        return SpatialEquilibrium(self.robot, scene, block, status, iterations)
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> SpatialEquilibrium:
+        return SpatialEquilibrium(self.robot, scene, block, status, *work)
 
 
 def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
@@ -107,7 +117,10 @@ def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
         rigidity=robot.rigidity,
         max_tension=robot.max_tension,
         max_length=robot.length_mm,
+        disk_radius=robot.offset_mm,
+        disk_thickness=0.0,
         lines=robot.lines_mm.tolist(),
+        edges=list(robot.edges_mm),
         between=robot.between,
     )
 

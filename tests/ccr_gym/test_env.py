@@ -87,7 +87,7 @@ def test_observations_stay_in_bounds_and_rewards_add_up(env_id, obs_mode):
             steps += 1
             assert env.observation_space.contains(observation)
             assert reward == pytest.approx(sum(info["reward_terms"].values()), abs=1e-12)
-            assert info["solver_status"] != Status.FAILED
+            assert info["solver_status"] != Status.GAVE_UP
             assert info["cost"] >= 0
         assert steps == env.unwrapped.task.steps == gymnasium.spec(env_id).max_episode_steps
 

@@ -74,7 +74,7 @@ def test_straight_robot_jams_head_on(cable):
     """Nothing tells it which way to give."""
     solver = Solver(robot_with(cable), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
     jammed = inserted(solver, (0.0, 155))
-    assert jammed.status is Status.JAMMED
+    assert jammed.status is Status.BLOCKED
     assert jammed.length_mm == pytest.approx(150, abs=1e-3)
     assert np.array_equal(solver.step(jammed, 0.0, 120).block, solver.rest().block)
 
