@@ -47,7 +47,7 @@ class Tally:
             statuses=Counter(Status(state.status).name for state in states),
             kinds=Counter({setting.kind: len(states)}),
             refused=setting.refused,
-            certificates_each=1 if model == "space" else 1000,
+            certificates_each=20 if model == "space" else 1000,
         )
 
     def add(self, other):
