@@ -44,7 +44,7 @@ instructions: $(INSTALL)  ## count instructions of the kernel (needs valgrind)
 	$(BIN)/python benchmarks/instructions.py
 
 soak: $(INSTALL)
-	$(BIN)/python -m pytest tests/solver/test_soak.py tests/solver/spatial/test_soak.py --soak 200000
+	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
 
 $(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/*) solver/formulation.py solver/spatial/formulation.py solver/codegen.py
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)

@@ -1,51 +1,77 @@
-"""A long random walk among random obstacles: nothing fails, nothing is penetrated, nothing is crossed."""
+"""Random walks in the plane among ordinary and adversarial obstacles; ``python -m soak`` is the long form."""
 
-from collections import Counter
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
+from soak.cores import CoreCheck, windings
+from soak.episodes import STEPS, Episode, play
+from soak.report import Tally
 
-from solver import Robot, Solver, Status
-from solver.robot import CABLES, LINES
+from solver import Capsule, Circle, Robot, Scene, Solver
+from solver.robot import CABLES
 
-STEPS_PER_SCENE = 100
-
-
-def walk(solver, pulls, insertions):
-    shortest, longest = solver.robot.lengths_mm
-    states, commands = [solver.rest()], []
-    for pull, insertion in zip(pulls, insertions, strict=True):
-        cable = min(max(states[-1].cable_mm + pull, 0.0), 14.0)
-        commands.append((cable, min(max(states[-1].length_mm + insertion, shortest), longest)))
-        states.append(solver.step(states[-1], *commands[-1]))
-    return states, commands
+SHORT = 3000
+ROBOT = Robot.prototype()
+LINE = replace(ROBOT, touch=("backbone",))
 
 
 @pytest.mark.parametrize("cable", CABLES)
-@pytest.mark.parametrize("mix", ["circles", "shapes", "thin shapes"])
-def test_random_walk(pytestconfig, cable, mix, random_scene, random_shapes, swept):
-    thin = mix == "thin shapes"
-    draw = random_scene if mix == "circles" else partial(random_shapes, thinnest=2 if thin else 6)
-    generator, counts = np.random.default_rng(0), Counter()
-    robot = replace(Robot.prototype(), cable=cable)
-    if mix != "circles":
-        robot = replace(robot, length_range_mm=(120, 180))
-    if thin:
-        robot = replace(robot, touch=LINES, between=3)
-    for _ in range(pytestconfig.getoption("soak") // STEPS_PER_SCENE):
-        scene = draw(generator)
-        solver = Solver(robot, scene)
-        pulls = generator.uniform(-0.5, 0.5, STEPS_PER_SCENE) + 0.14
-        states, commands = walk(solver, pulls, generator.uniform(-2, 2, STEPS_PER_SCENE))
-        counts.update(state.status.name for state in states[1:])
-        snapped = np.array([state.status is Status.SNAPPED for state in states[1:]])
-        crossed = swept(np.stack([state.nodes for state in states]), robot, scene).any(axis=1)
-        assert not crossed[~snapped].any()
-        for k in np.flatnonzero(snapped):
-            assert not swept(solver.trace(states[k], *commands[k]).nodes, robot, scene).any()
-        assert min(state.gaps.min() for state in states) >= -1e-6
-        assert max(state.tension for state in states) <= robot.max_tension * (1 + 1e-6)
-    print(dict(counts))
-    assert "GAVE_UP" not in counts
+def test_nothing_is_found_in_random_episodes(cable):
+    tally, cases = Tally(), []
+    for index in range(SHORT // STEPS):
+        counted, found = play(Episode(cable, 1, index))
+        tally.add(counted)
+        cases += found
+    assert cases == []
+    assert tally.steps == SHORT
+    assert tally.contact > SHORT / 10
+    assert tally.traced > 0
+    assert tally.certified > 0
+    assert {"CONVERGED", "SNAPPED", "STALLED"} <= set(tally.statuses)
+
+
+def test_an_episode_follows_from_its_seed():
+    first, again = (play(Episode("uniform", 3, 4))[0] for _ in range(2))
+    assert first == again
+
+
+PLACE = np.array([[0.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "turns"),
+    [
+        ([(-1, -3), (-1, -1), (-1, 1), (-1, 3)], [(1, -3), (1, -1), (1, 1), (1, 3)], -1),  # an edge sweeps over it
+        ([(-1, -3), (-1, -1), (-1, 1)], [(1, -3), (1, -2.5), (1, -2)], 0),  # the free end passes it
+        ([(-1, -3), (-1, -1), (-1, 1)], [(-0.1, -3), (-0.1, -1), (-0.1, 1)], 0),  # it comes near
+        ([(-1, -3), (-1, 3), (5, 3)], [(1, -3), (1, -1), (5, -1)], -1),  # all of it pulled through
+    ],
+)
+def test_windings_tell_a_sweep_from_a_free_end_that_passes(before, after, turns):
+    assert windings(np.array([before], float), np.array([after], float), PLACE) == [[turns]]
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [Circle(center=(30, 100), radius=6), Capsule(start=(30, 90), end=(50, 100), radius=5.2)],
+)
+def test_a_robot_moved_over_an_obstacle_sweeps_its_core(obstacle):
+    line = np.column_stack([np.zeros(19), np.linspace(0, 180, 19)])
+    over = np.linspace((0, 0), (60, 0), 16)[:, None]
+    points = (line + over)[:, None]
+    still = np.zeros((16, 1, 2))
+    swept = CoreCheck(LINE, Scene([obstacle])).swept(points, still)
+    assert swept.any()
+    assert not swept[:10].all()
+    with_it = over * [1.0, 0.0]
+    assert not CoreCheck(LINE, Scene([obstacle])).swept(points, with_it).any()
+
+
+def test_the_check_sees_the_one_step_that_passed_a_circle():
+    """The end that a step of 11.3 mm came to when both neighbours of an edge passed a circle of 1.05 × the spacing."""
+    circle = Circle(center=(30.6, 160.8), radius=5.25)
+    free = Solver(ROBOT, Scene())
+    states = [free.step(free.rest(), cable) for cable in np.linspace(0.01, 11.3, 200)]
+    points = np.stack([state.points for state in states])
+    assert CoreCheck(ROBOT, Scene([circle])).swept(points, np.zeros((200, 1, 2))).any()

@@ -1,0 +1,104 @@
+"""The soak in its long form: ``python -m soak --steps 3000000``."""
+
+import argparse
+import json
+import os
+import random
+import sys
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from soak.cases import find, shrink
+from soak.episodes import Episode, play
+from soak.report import Tally, table
+from soak.scenes import MODELS
+
+SHARES = {"uniform": 0.4, "sliding": 0.4, "space": 0.2}
+STEPS = 500  # of an episode
+REPORTS = 20  # on the way
+KEPT = 10  # cases of a kind that are made small and kept
+
+
+class Report:
+    """What has been found so far, in a folder."""
+
+    def __init__(self, folder, models):
+        self.folder, self.began = folder, time.time()
+        self.tallies, self.cases, self.kept = {model: Tally() for model in models}, [], Counter()
+
+    def add(self, model, tally, found):
+        """Add an episode; of each kind of finding only some cases are kept."""
+        self.tallies[model].add(tally)
+        for case in found:
+            self.kept[model, case["kind"]] += 1
+            if self.kept[model, case["kind"]] <= KEPT:
+                self.cases.append(case)
+
+    def write(self):
+        """Write ``soak.json``, ``soak.md`` and ``cases.json``."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        tallies = {model: tally.as_dict() for model, tally in self.tallies.items()}
+        report = {"seconds": time.time() - self.began, "tallies": tallies}
+        (self.folder / "soak.json").write_text(json.dumps(report, indent=1))
+        (self.folder / "soak.md").write_text(table(self.tallies) + "\n")
+        (self.folder / "cases.json").write_text(json.dumps(self.cases, indent=1))
+
+    def __str__(self):
+        found = "\n".join(f"{model}: {dict(t.findings) or 'nothing found'}" for model, t in self.tallies.items())
+        cases = f"cases are in {self.folder / 'cases.json'}; play one again with --case FILE INDEX"
+        return f"{table(self.tallies)}\n{found}\n{cases}\n{time.time() - self.began:.0f} s"
+
+
+def main():
+    """Run, write the table and the cases, and end with 1 where anything was found."""
+    options = _options()
+    if options.case:
+        sys.exit(_replay(*options.case))
+    report, episodes = Report(options.out, options.models), _episodes(options)
+    with ProcessPoolExecutor(options.processes) as pool:
+        played = zip(episodes, pool.map(play, episodes, chunksize=4), strict=True)
+        for count, (episode, (tally, found)) in enumerate(played, 1):
+            report.add(episode.model, tally, found)
+            if count % (-(-len(episodes) // REPORTS)) == 0:
+                print(
+                    f"{count / len(episodes):.0%}: {dict(report.kept) or 'nothing found'}", file=sys.stderr, flush=True
+                )
+                report.write()
+        report.cases = list(pool.map(shrink, report.cases))
+    report.write()
+    print(report)
+    sys.exit(bool(report.cases))
+
+
+def _episodes(options):
+    """All episodes, shuffled, so that a part of them tells of all models."""
+    total = sum(SHARES[model] for model in options.models)
+    counts = {model: -(-int(options.steps * SHARES[model] / total) // STEPS) for model in options.models}
+    episodes = [Episode(model, options.seed, k, STEPS) for model, count in counts.items() for k in range(count)]
+    random.Random(options.seed).shuffle(episodes)
+    return episodes
+
+
+def _replay(path, index):
+    """Play one case of a report again, and tell what it shows."""
+    case = json.loads(Path(path).read_text())[int(index)]
+    findings = find(case)
+    print(json.dumps(case, indent=1), *findings, sep="\n")
+    return not findings
+
+
+def _options():
+    parser = argparse.ArgumentParser(description=__doc__, prog="python -m soak")
+    parser.add_argument("--steps", type=int, default=30_000, help="steps in total (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of all episodes")
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
+    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument("--out", type=Path, default=Path("runs/soak"), help="folder of the report and the cases")
+    parser.add_argument("--case", nargs=2, metavar=("FILE", "INDEX"), help="play one case of cases.json again")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+"""What must hold of every step of a walk."""
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from soak.cores import CoreCheck, line_points
+from soak.shapes import distance
+from soak.walks import command_of, step
+from solver import Robot, Status
+
+FAR = 0.5  # of the shortest edge: a step that moves a point farther is looked at from one accepted shape to the next
+CERTIFY_EVERY = 1000
+MOST_FACTORIZATIONS = 5000
+MOST_BLOCKED = 3  # blocked steps of an episode that are tried another way
+DEEPEST = 1e-12  # of the robot's length
+INSIDE = 1e-11  # the same by the distances in numpy, which round differently
+ROUNDOFF = 1e-12
+BAND = 1e-6  # of the tension limit
+OPTIMAL = 1e-8
+CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
+
+
+class Finding(NamedTuple):
+    """Something that must not happen, at a step of an episode."""
+
+    kind: str
+    step: int
+    value: float
+
+
+def check(solver, taken, tally, offset=0):
+    """Everything that must not happen and did; what was measured is added to the tally."""
+    findings = _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
+    findings += _blocked(solver, taken, tally) + _cores(solver, taken, tally)
+    tally.findings.update(finding.kind for finding in findings)
+    return findings
+
+
+def _states(solver, taken, tally):
+    """Numbers, gaps, tensions, verdicts and work of every state."""
+    states, robot = taken.states, solver.robot
+    length = robot.length_mm
+    finite = np.array([np.isfinite(state.block[~np.isposinf(state.block)]).all() for state in states])
+    least = np.array([state.gaps.min(initial=math.inf) for state in states]) / length
+    inside = _least_distance(solver, states) / length
+    edges = np.linalg.norm(np.diff(_points(states), axis=2), axis=-1).max(axis=2) / robot.edges_mm
+    tension = np.array([np.max(_tensions(state)) for state in states]) / robot.max_tension
+    work = np.array([state.factorizations for state in states])
+    gave_up = np.array([state.status == Status.GAVE_UP for state in states])
+    tally.least_gap = min(tally.least_gap, least.min(initial=math.inf))
+    tally.least_distance = min(tally.least_distance, inside.min(initial=math.inf))
+    tally.most_tension = max(tally.most_tension, tension.max())
+    tally.most_factorizations = max(tally.most_factorizations, int(work.max()))
+    return [
+        *_first("not finite", ~finite, least),
+        *_first("gap", least < -DEEPEST, least),
+        *_first("penetration", inside < -INSIDE, inside),
+        *_first("edge", edges.max(axis=1) > 1 + ROUNDOFF, edges.max(axis=1)),
+        *_first("tension", tension > 1 + BAND, tension),
+        *_first("factorizations", work > MOST_FACTORIZATIONS, work),
+        *_first("gave up", gave_up, work),
+    ]
+
+
+def _tensions(state):
+    return state.tension if isinstance(state.robot, Robot) else state.tensions
+
+
+def _first(kind, wrong, values):
+    """The first step at which something is wrong; what follows may follow from it."""
+    return [Finding(kind, max(int(k) - 1, 0), float(values[k])) for k in np.flatnonzero(wrong)[:1]]
+
+
+def _points(states):
+    robot = states[0].robot
+    frames = None if isinstance(robot, Robot) else np.stack([state.frames for state in states])
+    return line_points(robot, np.stack([state.nodes for state in states]), frames)
+
+
+def _displacements(states):
+    return np.stack([state.displacements for state in states])
+
+
+def _least_distance(solver, states):
+    """Least signed distance of the points that can touch to the obstacles that all can, ``(T+1,)`` [mm]."""
+    points, moved = _points(states), _displacements(states)
+    distances = [
+        distance(obstacle, points - moved[:, None, None, j]).min(axis=(1, 2))
+        for j, obstacle in enumerate(solver.scene)
+        if obstacle.nodes is None
+    ]
+    return np.min(distances, axis=0) if distances else np.full(len(states), math.inf)
+
+
+def _optimality(solver, taken, tally, offset):
+    """The kernel's own measure of every state, and the node-coordinate certificate of events and now and then."""
+    findings, certified = [], 0
+    for k, (before, state) in enumerate(pairwise(taken.states)):
+        worst = float(np.max(solver.optimality(state)))
+        tally.worst_optimality = max(tally.worst_optimality, worst)
+        if not worst <= OPTIMAL:
+            findings.append(Finding("optimality", k, worst))
+        event = state.status != Status.CONVERGED and not np.array_equal(before.block, state.block)
+        tally.events += event
+        if (event and certified < tally.certificates_each) or (offset + k) % CERTIFY_EVERY == 0:
+            certified += 1
+            tally.certified += 1
+            worst = certificate(state)
+            tally.worst_certificate = max(tally.worst_certificate, worst)
+            if not worst <= CERTIFIED:
+                findings.append(Finding("certificate", k, worst))
+    return findings
+
+
+def certificate(state):
+    """Worst residual of the node-coordinate problem in natural units."""
+    length, residuals = state.robot.length_mm, state.residuals()
+    return max(
+        residuals.stationarity * length,
+        residuals.lengths / length,
+        residuals.gaps / length,
+        residuals.complementarity,
+        residuals.sign * length,
+    )
+
+
+def _blocked(solver, taken, tally):
+    """Blocked steps, and whether another way gets on from there."""
+    blocked = np.flatnonzero([state.status == Status.BLOCKED for state in taken.states[1:]])
+    tally.blocked += len(blocked)
+    findings = []
+    for k in blocked[:MOST_BLOCKED].tolist():
+        passed = _other_ways(solver, taken, k)
+        tally.blocked_unconfirmed += passed
+        kind = "blocked, but not another way" if passed else "blocked"
+        findings.append(Finding(kind, k, taken.states[k + 1].factorizations))
+    return findings
+
+
+def _other_ways(solver, taken, k):
+    """Whether a command that was blocked is reached, or its tension limit is, in small steps or by another way."""
+    before, command = taken.states[k], taken.commands[k]
+    start = command_of(before)
+    small = np.linspace(start, command, 41)[1:]
+    corner = [np.array([command[0], *start[1:]]), command]
+    straight = np.linspace(command_of(solver.rest()), command, 81)[1:]
+    ways = (before, small), (before, corner), (solver.rest(), straight)
+    return any(_passes(solver, *way) for way in ways)
+
+
+def _passes(solver, state, commands):
+    for command in commands:
+        state = step(solver, state, command)
+    return state.status < Status.BLOCKED
+
+
+def _cores(solver, taken, tally):
+    """Cores swept from state to state where all moves are small, else from one accepted shape to the next."""
+    core, states = CoreCheck(solver.robot, solver.scene), taken.states
+    if not core.obstacles:
+        return []
+    points, moved = _points(states), _displacements(states)
+    motion = np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=(1, 2))
+    motion = np.maximum(motion, np.linalg.norm(np.diff(moved, axis=0), axis=-1).max(axis=1, initial=0))
+    snapped = np.array([state.status == Status.SNAPPED for state in states[1:]], bool)
+    swept = core.swept(points, moved)
+    looked = snapped | (motion > FAR * min(solver.robot.edges_mm)) | swept.any(axis=1)
+    tally.traced += int(looked.sum())
+    findings = []
+    for steps in _chunks(np.flatnonzero(looked)):
+        findings += [Finding("core swept", k, j) for k, j in _traced(solver, core, taken, steps)]
+    tally.cores_swept += len(findings)
+    return findings
+
+
+def _chunks(steps, size=16):
+    return [steps[k : k + size] for k in range(0, len(steps), size)]
+
+
+def _traced(solver, core, taken, steps):
+    """(step, obstacle) of cores that some steps swept."""
+    ways = [accepted(solver, taken.states[k], taken.commands[k]) for k in steps]
+    points, moved = (np.concatenate(parts) for parts in zip(*ways, strict=True))
+    owner = np.repeat(steps, [len(way[0]) for way in ways])
+    swept = core.swept(points, moved, linked=owner[1:] == owner[:-1])
+    return sorted({(int(owner[k]), int(j)) for k, j in np.argwhere(swept)})
+
+
+def accepted(solver, state, command):
+    """Points, and displacements of obstacles, of all shapes accepted on the way of a step, with the first and last."""
+    if isinstance(solver.robot, Robot):
+        trace = solver.trace(state, float(command[0]), float(command[1]))
+    else:
+        trace = solver.trace(state, command[:2])
+    return trace.points, trace.displacements

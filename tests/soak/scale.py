@@ -1,0 +1,122 @@
+"""The scaling law: lengths × s, rigidities × s², springs × 1/s leave forces, tensions and angles as they are."""
+
+from dataclasses import replace
+from functools import singledispatch
+
+import numpy as np
+
+from solver import Capsule, Circle, Custom, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene, spatial
+
+VANISHING = 1e-290  # smaller numbers have fewer bits, which do not scale
+DIRECTIONS = ("normal", "axis", "second")
+CABLE_POWERS = {
+    "objective": 0,
+    "nodes": None,  # places and, in the plane, angles
+    "multipliers": -1,
+    "gaps": 1,
+    "displacements": 1,
+    "forces": 0,
+    "length_mm": 1,
+}
+PLANAR_POWERS = {**CABLE_POWERS, "cable_mm": 1, "tension": 0, "shear": 0, "onset_tension": 0}
+SPATIAL_POWERS = {**CABLE_POWERS, "cables_mm": 1, "tensions": 0, "controls": 0, "frames": 0, "onset_tensions": 0}
+
+
+def times(point, s):
+    """A point, pair, or range times a factor; None stays None."""
+    return None if point is None else tuple(s * value for value in point)
+
+
+def scale_robot(robot, s):
+    """The same robot s times as large, with the same tensions and forces.
+
+    Custom shapes scale with their family: it must be one whose sizes are all lengths.
+    """
+    lengths = {
+        "length_mm": s * robot.length_mm,
+        "offset_mm": s * robot.offset_mm,
+        "max_cable_mm": s * robot.max_cable_mm,
+    }
+    if isinstance(robot, Robot):
+        disks = {"disk_radius_mm": s * robot.disk_radius_mm, "disk_thickness_mm": s * robot.disk_thickness_mm}
+        lengths |= disks | {"length_range_mm": times(robot.length_range_mm, s)}
+    return replace(robot, rigidity=s * s * robot.rigidity, **lengths)
+
+
+def scale_scene(scene, s):
+    """The same obstacles s times as large and as far, on springs 1/s times as stiff."""
+    return Scene(scale_obstacle(obstacle, s) for obstacle in scene)
+
+
+def scale_obstacle(obstacle, s):
+    """One obstacle s times as large and as far."""
+    matrix = obstacle.stiffness and tuple(times(row, 1 / s) for row in obstacle.stiffness)
+    scaled = replace(obstacle, stiffness=matrix, **_lengths(obstacle, s))
+    for direction in DIRECTIONS:  # normalised once more on construction, which may change their last bits
+        if hasattr(obstacle, direction):
+            object.__setattr__(scaled, direction, getattr(obstacle, direction))
+    return scaled
+
+
+@singledispatch
+def _lengths(obstacle: Obstacle, s):
+    raise TypeError(f"{obstacle!r} has no scaling law")
+
+
+@_lengths.register(Circle)
+@_lengths.register(spatial.Sphere)
+def _(obstacle, s):
+    return {"center": times(obstacle.center, s), "radius": s * obstacle.radius}
+
+
+@_lengths.register(HalfPlane)
+@_lengths.register(spatial.HalfSpace)
+def _(obstacle, s):
+    return {"point": times(obstacle.point, s)}
+
+
+@_lengths.register
+def _(obstacle: Ellipse, s):
+    return {"center": times(obstacle.center, s), "radii": times(obstacle.radii, s)}
+
+
+@_lengths.register(Capsule)
+@_lengths.register(spatial.Capsule)
+def _(obstacle, s):
+    return {"start": times(obstacle.start, s), "end": times(obstacle.end, s), "radius": s * obstacle.radius}
+
+
+@_lengths.register
+def _(obstacle: Polygon, s):
+    return {"corners": tuple(times(corner, s) for corner in obstacle.corners), "radius": s * obstacle.radius}
+
+
+@_lengths.register
+def _(obstacle: Custom, s):
+    return {"center": times(obstacle.center, s), "sizes": times(obstacle.sizes, s), "reach": s * obstacle.reach}
+
+
+@_lengths.register
+def _(obstacle: spatial.Cylinder, s):
+    ends = {"start": times(obstacle.start, s), "end": times(obstacle.end, s)}
+    return {**ends, "radius": s * obstacle.radius, "edge": s * obstacle.edge}
+
+
+@_lengths.register
+def _(obstacle: spatial.Box, s):
+    return {"center": times(obstacle.center, s), "sizes": times(obstacle.sizes, s), "edge": s * obstacle.edge}
+
+
+def natural(equilibrium, s=1.0):
+    """The numbers of an equilibrium of a robot scaled by s, as those of the robot at s = 1, by name.
+
+    With s a power of two the division is exact, so that the law holds to the last bit of every number that does not
+    vanish.
+    """
+    planar = isinstance(equilibrium.robot, Robot)
+    powers = PLANAR_POWERS if planar else SPATIAL_POWERS
+    values = {name: np.asarray(getattr(equilibrium, name)) for name in powers}
+    nodes = values.pop("nodes")
+    numbers = {name: value / s ** powers[name] for name, value in values.items()}
+    numbers |= {"places": nodes[:, :2] / s, "angles": nodes[:, 2]} if planar else {"places": nodes / s}
+    return {name: np.where(np.abs(value) < VANISHING, 0.0, value) for name, value in numbers.items()}

@@ -1,0 +1,356 @@
+"""What episodes are played in: robots of many kinds in scenes that are ordinary, or made to break the solver.
+
+Everything is sampled around the paper's prototype, and scaled afterwards.
+"""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from soak.cores import line_points
+from soak.scale import scale_robot, scale_scene
+from soak.shapes import distance
+from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver, spatial
+from solver.robot import LINES
+from solver.spatial import SpatialRobot, SpatialSolver
+
+MODELS = ("uniform", "sliding", "space")
+SCALES = (0.1, 1.0, 1.0, 1.0, 10.0)
+TRIES = 200
+OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
+
+
+class Setting(NamedTuple):
+    """What an episode is played in.
+
+    Attributes:
+        kind: Name of the sampler of its scene.
+        scale: How large its robot is, beside the prototype.
+        solver: Of its robot and scene.
+        refused: How many scenes the solver would not take before.
+    """
+
+    kind: str
+    scale: float
+    solver: Solver | SpatialSolver
+    refused: int
+
+
+def sample_setting(generator, model, kinds=None, scales=SCALES):
+    """A robot in a scene that leaves it clear at rest, and whose obstacles all have a core."""
+    sample_robot, samplers = (spatial_robot, SPATIAL_KINDS) if model == "space" else (planar_robot, PLANAR_KINDS)
+    for refused in range(TRIES):
+        kind = str(generator.choice(kinds or list(samplers)))
+        robot = sample_robot(generator) if model == "space" else sample_robot(generator, model)
+        scene = Scene(samplers[kind](generator, robot))
+        scale = float(generator.choice(scales))
+        try:
+            return Setting(kind, scale, make_solver(scale_robot(robot, scale), scale_scene(scene, scale)), refused)
+        except ValueError:
+            continue
+    raise RuntimeError(f"{TRIES} sampled scenes in a row were refused")
+
+
+def make_solver(robot, scene):
+    """The solver of a robot in the plane or in space."""
+    return (Solver if isinstance(robot, Robot) else SpatialSolver)(robot, scene)
+
+
+def planar_robot(generator, cable):
+    """The prototype, or one of more or fewer segments, other lines and points, and a base that inserts it."""
+    robot = replace(Robot.prototype(segments=int(generator.choice([9, 18, 18, 18, 30]))), cable=cable)
+    if generator.random() < 0.5:
+        robot = replace(robot, between=int(generator.integers(4)))
+    if generator.random() < 0.3:
+        robot = replace(robot, touch=LINES)
+    if generator.random() < 0.3:
+        robot = replace(robot, length_range_mm=(100.0, 180.0), length_mm=float(generator.uniform(100, 180)))
+    return robot
+
+
+def spatial_robot(generator):
+    """The prototype, or one of fewer segments, other lines, points and angles."""
+    robot = SpatialRobot.prototype(
+        segments=int(generator.choice([9, 18, 18, 18])), angle=float(generator.choice([math.pi / 2, 2 * math.pi / 3]))
+    )
+    if generator.random() < 0.3:
+        robot = replace(robot, between=1)
+    if generator.random() < 0.2:
+        robot = replace(robot, touch=("backbone", "rim"), rim_points=8)
+    return robot
+
+
+def _clear(generator, robot, sample, count, margin=None):
+    """So many sampled obstacles that stay clear of the straight robot, or fewer where there is no room."""
+    margin = generator.choice([0.02, 1.0]) if margin is None else margin
+    rest, kept = rest_points(robot), []
+    for _ in range(8 * count):
+        obstacle = sample()
+        if distance(obstacle, rest).min() > margin:
+            kept.append(obstacle)
+        if len(kept) == count:
+            break
+    return kept
+
+
+def rest_points(robot):
+    """Where the points of the straight robot are, ``(p * positions, d)``."""
+    along = np.linspace(0, robot.length_mm, robot.segments + 1)
+    nodes, frames = np.zeros((1, len(along), 3)), np.broadcast_to(np.eye(3), (1, len(along), 3, 3))
+    nodes[0, :, 1 if isinstance(robot, Robot) else 2] = along
+    points = line_points(robot, nodes, frames)
+    return points.reshape(-1, points.shape[-1])
+
+
+def _spring(generator, chance=0.5, powers=(-4, 3)):
+    return float(10 ** generator.uniform(*powers)) if generator.random() < chance else None
+
+
+def _unit(generator, size):
+    vector = generator.normal(size=size)
+    return vector / np.linalg.norm(vector)
+
+
+def _ahead(generator, low=20.0, high=80.0):
+    """A place that the pulled robot comes to, now and then one behind it."""
+    side = -0.3 if generator.random() < 0.1 else 1
+    return np.array([side * generator.uniform(low, high), generator.uniform(45, 185)])
+
+
+def _width(robot):
+    """Inner radius of an obstacle that surely has a core."""
+    return 0.66 * max(robot.edges_mm)
+
+
+# The plane.
+
+
+def _planar_shape(generator, robot, thinnest, spring):
+    center, axis = _ahead(generator), _unit(generator, 2)
+    across, along = thinnest + generator.exponential(3, 2)
+    place = {"center": tuple(center), "stiffness": spring}
+    match generator.integers(6):
+        case 0:
+            return Circle(radius=across, **place)
+        case 1:
+            return Ellipse(radii=(across, along), axis=tuple(axis), **place)
+        case 2:
+            ends = {"start": tuple(center - along * axis), "end": tuple(center + along * axis)}
+            return Capsule(radius=across, stiffness=spring, **ends)
+        case 3:
+            return _polygon(generator, center, along + 2, across / 2, spring)
+        case 4:
+            return Custom(
+                family=OVAL, sizes=(across + 1, along + 1), axis=tuple(axis), reach=2.5 * (across + along), **place
+            )
+        case _:
+            return HalfPlane(point=tuple(center), normal=(-1, generator.uniform(-1, 1)), stiffness=spring)
+
+
+def _polygon(generator, center, size, radius, spring=None):
+    count = int(generator.integers(3, 9))
+    angles = 2 * np.pi / count * (np.arange(count) + generator.uniform(0, 0.4, count)) + generator.uniform(0, 6)
+    ring = center + size * np.column_stack([np.cos(angles), np.sin(angles)])
+    return Polygon(corners=tuple(map(tuple, ring)), radius=radius, stiffness=spring)
+
+
+def circles(generator, robot):
+    """One to three large circles."""
+    low, high = (35, 75, 10), (75, 150, 16)
+
+    def sample():
+        x, y, radius = generator.uniform(low, high)
+        return Circle(center=(x, y), radius=radius)
+
+    return _clear(generator, robot, sample, int(generator.integers(1, 4)), margin=1.0)
+
+
+def shapes(generator, robot):
+    """One to five obstacles of any kind, half of them on springs."""
+    thinnest = _width(robot)
+    return _clear(
+        generator,
+        robot,
+        lambda: _planar_shape(generator, robot, thinnest, _spring(generator)),
+        int(generator.integers(1, 6)),
+    )
+
+
+def crowd(generator, robot):
+    """Six to thirty-two small circles everywhere."""
+
+    def sample():
+        return Circle(center=tuple(_ahead(generator, 9, 110)), radius=_width(robot) * generator.uniform(1, 1.6))
+
+    return _clear(generator, robot, sample, int(generator.integers(6, 33)))
+
+
+def narrow(generator, robot):
+    """Circles and capsules that are hardly wider than the points are apart, close to the robot."""
+
+    def sample():
+        radius = max(robot.edges_mm) * generator.uniform(0.5, 0.65)
+        if generator.random() < 0.8:
+            return Circle(center=tuple(_ahead(generator, 14, 50)), radius=radius)
+        start, way = _ahead(generator, 14, 50), generator.uniform(1, 20) * _unit(generator, 2)
+        return Capsule(start=tuple(start), end=tuple(start + way), radius=radius)
+
+    return _clear(generator, robot, sample, int(generator.integers(1, 7)))
+
+
+def channel(generator, robot):
+    """Two walls, or two rows of circles, with little room for the robot between them, now and then more ahead."""
+    room = generator.uniform(0.05, 6, 2)
+    low, high = min(robot.lines_mm) - room[0], max(robot.lines_mm) + room[1]
+    ahead = [Circle(center=tuple(_ahead(generator, 30, 60)), radius=_width(robot) + generator.uniform(0, 6))]
+    if generator.random() < 0.4:
+        walls = [HalfPlane(point=(low, 0), normal=(1, 0)), HalfPlane(point=(high, 0), normal=(-1, 0))]
+        return walls[generator.integers(2) :] if generator.random() < 0.5 else walls
+    radius = _width(robot) * generator.uniform(1, 2)
+    heights = np.arange(generator.uniform(20, 90), robot.length_mm + 10, radius * generator.uniform(1.6, 4))
+    rows = [Circle(center=(low - radius, y), radius=radius) for y in heights]
+    rows += [Circle(center=(high + radius, y + radius), radius=radius) for y in heights]
+    return rows[:31] + [circle for circle in ahead if distance(circle, rest_points(robot)).min() > 0.1]
+
+
+def sharp(generator, robot):
+    """Polygons with corners, and ellipses with ends, down to a millionth of the robot's length."""
+
+    def sample():
+        radius, size = robot.length_mm * 10 ** generator.uniform(-6, -1.3), generator.uniform(9, 20)
+        if generator.random() < 0.8:
+            return _polygon(generator, _ahead(generator), size, radius, _spring(generator, 0.2))
+        return Ellipse(
+            center=tuple(_ahead(generator)),
+            radii=(_width(robot), max(size, _width(robot) ** 2 / max(radius, 0.5))),
+            axis=tuple(_unit(generator, 2)),
+        )
+
+    return _clear(generator, robot, sample, int(generator.integers(1, 4)))
+
+
+def springs(generator, robot):
+    """One to four obstacles of any kind, all on springs, from a thread to a vice."""
+    thinnest = _width(robot)
+    return _clear(
+        generator,
+        robot,
+        lambda: _planar_shape(generator, robot, thinnest, _spring(generator, 1.0)),
+        int(generator.integers(1, 5)),
+    )
+
+
+PLANAR_KINDS = {sampler.__name__: sampler for sampler in (circles, shapes, crowd, narrow, channel, sharp, springs)}
+
+
+# Space.
+
+
+def _around(generator, low=20.0, high=80.0):
+    """A place around the robot."""
+    azimuth, radius = generator.uniform(0, 2 * math.pi), generator.uniform(low, high)
+    return np.array([radius * math.cos(azimuth), radius * math.sin(azimuth), generator.uniform(45, 185)])
+
+
+def _spatial_shape(generator, robot, thinnest, spring, edge=None, low=20.0):
+    center, axis, second = _around(generator, low), _unit(generator, 3), _unit(generator, 3)
+    across, along = thinnest + generator.exponential(4, 2)
+    edge = generator.uniform(0.2, 1) * thinnest if edge is None else edge
+    ends = {"start": tuple(center - along * axis), "end": tuple(center + along * axis), "stiffness": spring}
+    match generator.integers(5):
+        case 0:
+            return spatial.Sphere(center=tuple(center), radius=across, stiffness=spring)
+        case 1:
+            return spatial.Capsule(radius=across, **ends)
+        case 2:
+            return spatial.Cylinder(radius=across, edge=min(edge, across, along), **ends)
+        case 3:
+            sizes = 2 * thinnest + generator.exponential(8, 3)
+            box = {"axis": tuple(axis), "second": tuple(second), "edge": min(edge, sizes.min() / 2)}
+            return spatial.Box(center=tuple(center), sizes=tuple(sizes), stiffness=spring, **box)
+        case _:
+            inward = np.array([-center[0], -center[1], 0]) / math.hypot(*center[:2])
+            return spatial.HalfSpace(point=tuple(center), normal=tuple(inward + 0.3 * axis), stiffness=spring)
+
+
+def spheres(generator, robot):
+    """One to three large balls."""
+
+    def sample():
+        return spatial.Sphere(center=tuple(_around(generator, 35, 75)), radius=generator.uniform(10, 16))
+
+    return _clear(generator, robot, sample, int(generator.integers(1, 4)), margin=1.0)
+
+
+def spatial_shapes(generator, robot):
+    """One to five obstacles of any kind, half of them on springs."""
+    return _spatial_shapes(generator, robot, lambda: _spring(generator), int(generator.integers(1, 6)))
+
+
+def spatial_springs(generator, robot):
+    """One to four obstacles of any kind, all on springs, from a thread to a vice."""
+    return _spatial_shapes(generator, robot, lambda: _spring(generator, 1.0), int(generator.integers(1, 5)))
+
+
+def _spatial_shapes(generator, robot, spring, count):
+    return _clear(generator, robot, lambda: _spatial_shape(generator, robot, _width(robot), spring()), count)
+
+
+def spatial_crowd(generator, robot):
+    """Six to thirty-two small balls all around."""
+
+    def sample():
+        return spatial.Sphere(
+            center=tuple(_around(generator, 12, 90)), radius=_width(robot) * generator.uniform(1, 1.8)
+        )
+
+    return _clear(generator, robot, sample, int(generator.integers(6, 33)))
+
+
+def spatial_narrow(generator, robot):
+    """Balls that are hardly wider than the points are apart, close to the robot."""
+
+    def sample():
+        radius = max(robot.edges_mm) * generator.uniform(0.5, 0.65)
+        return spatial.Sphere(center=tuple(_around(generator, 16, 45)), radius=radius)
+
+    return _clear(generator, robot, sample, int(generator.integers(1, 7)))
+
+
+def spatial_channel(generator, robot):
+    """Walls on up to four sides, or rings of balls, with little room for the robot between them."""
+    room = generator.uniform(0.05, 5, 4)
+    sides = [np.array(side, float) for side in ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))]
+    if generator.random() < 0.4:
+        walls = [
+            spatial.HalfSpace(point=tuple((8 + gap) * side), normal=tuple(-side))
+            for gap, side in zip(room, sides, strict=True)
+        ]
+        return walls[: int(generator.integers(1, 5))]
+    radius = _width(robot) * generator.uniform(1, 2)
+    heights = np.arange(generator.uniform(30, 100), robot.length_mm + 10, radius * generator.uniform(1.6, 4))
+    rings = [(8 + gap + radius) * side + [0, 0, z] for z in heights for gap, side in zip(room, sides, strict=True)]
+    return [spatial.Sphere(center=tuple(center), radius=radius) for center in rings[:32]]
+
+
+def spatial_sharp(generator, robot):
+    """Boxes and cylinders with edges down to a millionth of the robot's length."""
+
+    def sample():
+        edge = robot.length_mm * 10 ** generator.uniform(-6, -1.5)
+        return _spatial_shape(generator, robot, _width(robot), _spring(generator, 0.2), edge)
+
+    return _clear(generator, robot, sample, int(generator.integers(1, 4)))
+
+
+SPATIAL_KINDS = {
+    "spheres": spheres,
+    "shapes": spatial_shapes,
+    "crowd": spatial_crowd,
+    "narrow": spatial_narrow,
+    "channel": spatial_channel,
+    "sharp": spatial_sharp,
+    "springs": spatial_springs,
+}
