@@ -36,3 +36,14 @@ def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
             points[:] = False
             points[:, :: robot.between + 1] = obstacle.touchable(robot.segments + 1)
     return touchable
+
+
+def gaps_of(robot: AnyRobot, scene: Scene, points: np.ndarray) -> np.ndarray:
+    """Gaps of the points of a robot ``(p, k, d)``, infinite where they cannot touch, ``(m, p, k)`` [mm].
+
+    Raises:
+        ValueError: If an obstacle names a node that the robot does not have.
+    """
+    touchable = touchable_points(robot, scene)
+    gaps = np.array([obstacle.gap(points) for obstacle in scene]).reshape(touchable.shape)
+    return np.where(touchable, gaps, np.inf)

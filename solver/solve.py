@@ -9,11 +9,13 @@ from solver._kernel import SHAPE_SIZE
 from solver.compile import law_address
 from solver.equilibrium import BaseEquilibrium, Equilibrium
 from solver.geometry import touchable_points
-from solver.layout import LENGTH
+from solver.layout import LENGTH, PLANE, Model
 from solver.obstacles import SHAPES
 from solver.robot import AnyRobot, Robot
 from solver.scene import Scene
-from solver.status import Status
+from solver.validation import instance, number, shown
+
+SPRINGS = (1e-10, 1e10)  # stiffness of an obstacle's spring, over EI/L³ of the robot
 
 
 class Solver:
@@ -27,12 +29,14 @@ class Solver:
         scene: The obstacles.
 
     Raises:
-        ValueError: If an obstacle overlaps the straight robot, is narrow enough to slip between its points, or names a
-            node the robot does not have.
+        ValueError: If an obstacle is one of space, overlaps the straight robot, is narrow enough to slip between its
+            points, names a node the robot does not have, or is out of all proportion to it.
+        TypeError: If the robot or the scene is something else.
         RuntimeError: If a :class:`~solver.custom.Custom` shape cannot be compiled.
     """
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
+        check_scene(robot, Robot, scene, PLANE)
         self.robot = robot
         self.scene = scene
         check_width(robot, scene)
@@ -40,7 +44,7 @@ class Solver:
         straight = np.zeros(self._kernel.block_size)
         straight[LENGTH] = robot.length_mm
         self._rest = self._follow(straight, 0.0, robot.length_mm)
-        check_clear(self._rest)
+        check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> Equilibrium:
         """The straight, unactuated robot."""
@@ -62,8 +66,9 @@ class Solver:
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is something else.
         """
-        length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        cable_mm, length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         return self._follow(equilibrium.block, cable_mm, length_mm)
 
     def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> np.ndarray:
@@ -74,14 +79,14 @@ class Solver:
         Raises:
             ValueError: As :meth:`step`.
         """
-        length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        cable_mm, length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         shapes = self._kernel.trace(equilibrium.block, (cable_mm, length_mm))
         return np.reshape(shapes, (-1, self.robot.segments + 1, 3))
 
     def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
         status, iterations = self._kernel.step(block, cable_mm, length_mm, reached)
-        return Equilibrium(self.robot, self.scene, reached, Status(status), iterations)
+        return Equilibrium.solved(self.robot, self.scene, reached, status, iterations)
 
 
 def kernel_robot(robot: Robot) -> _kernel.Robot:
@@ -145,43 +150,73 @@ def check_width(robot: AnyRobot, scene: Scene) -> None:
             )
 
 
-def check_clear(rest: BaseEquilibrium) -> None:
-    """Refuse obstacles that overlap the straight robot.
+def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
+    """Refuse obstacles that overlap the straight robot, whose gaps are given, ``(m, p, k)``.
 
     Raises:
         ValueError: Naming the obstacle, the node and the depth.
     """
-    for obstacle, gaps in zip(rest.scene, rest.gaps, strict=True):
-        if gaps.min() < 0:
-            node = int(np.unravel_index(gaps.argmin(), gaps.shape)[1]) // (rest.robot.between + 1)
-            raise ValueError(f"{obstacle!r} overlaps the straight robot by {-gaps.min():.3g} mm at node {node}")
+    for obstacle, own in zip(scene, gaps, strict=True):
+        if own.min() < 0:
+            node = int(np.unravel_index(own.argmin(), own.shape)[1]) // (robot.between + 1)
+            raise ValueError(f"{shown(obstacle)} overlaps the straight robot by {-own.min():.3g} mm at node {node}")
+
+
+def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None:
+    """Refuse a robot and a scene that a solver has no use for, or that are out of all proportion to each other.
+
+    Raises:
+        TypeError: If they are not of the classes asked for.
+        ValueError: Naming the obstacle, the value and the bound.
+    """
+    instance("robot", robot, kind, "robots of the plane are solver.Robot, those of space solver.spatial.SpatialRobot")
+    instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+    for obstacle in scene:
+        if obstacle.space != model.space:
+            names = ("the plane", "solver.spatial") if model.space == 3 else ("space", "solver")
+            raise ValueError(f"{shown(obstacle)} is an obstacle of {names[0]}; give one of {names[1]}")
+        obstacle.check_proportion(robot.longest_mm)
+        if obstacle.stiffness is not None:
+            _check_spring(robot, obstacle.stiffness_matrix)
+
+
+def _check_spring(robot: AnyRobot, stiffness: np.ndarray) -> None:
+    low, high = (ratio * robot.rigidity / robot.longest_mm**3 for ratio in SPRINGS)
+    least, *_, most = np.linalg.eigvalsh(stiffness)
+    if not low <= least <= most <= high:
+        raise ValueError(
+            f"stiffness is from {least:.6g} to {most:.6g} N/mm; it must be from {low:.6g} to {high:.6g} N/mm, "
+            f"{SPRINGS[0]:g} to {SPRINGS[1]:g} of the robot's EI/L³: leave out a softer obstacle, fix a stiffer one"
+        )
 
 
 def check_command(
     robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None
-) -> float:
-    """Refuse a command out of range and an equilibrium of another robot or scene; returns the length asked for.
+) -> tuple[float, float]:
+    """Refuse a command out of range and an equilibrium of another robot or scene; returns the command as floats.
 
     Raises:
         ValueError: Naming the value and the bound.
+        TypeError: If the equilibrium is something else.
     """
-    if not (math.isfinite(cable_mm) and 0 <= cable_mm <= robot.cable_limit_mm):
-        raise ValueError(
-            f"cable_mm is {cable_mm}; it must be from 0 to {robot.cable_limit_mm:.6g} (robot.max_cable_mm)"
-        )
-    check_origin(robot, scene, equilibrium)
+    limit = robot.cable_limit_mm
+    if not (type(cable_mm) is float and 0 < cable_mm <= limit):
+        cable_mm = number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+    check_origin(robot, scene, equilibrium, Equilibrium)
     if length_mm is None:
-        return equilibrium.length_mm
-    robot.check_length(length_mm)
-    return length_mm
+        return cable_mm, equilibrium.length_mm
+    return cable_mm, robot.check_length(length_mm)
 
 
-def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium) -> None:
+def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium, kind: type) -> None:
     """Refuse an equilibrium of another robot or scene.
 
     Raises:
         ValueError: Saying which of them differs.
+        TypeError: If it is something else.
     """
+    if not isinstance(equilibrium, kind):
+        instance("equilibrium", equilibrium, kind, "step from rest() of this solver")
     if equilibrium.robot is not robot and equilibrium.robot != robot:
         raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
     if equilibrium.scene is not scene and equilibrium.scene != scene:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.robot import check_numbers, require_positive
+from solver.robot import check_cable, check_numbers, check_points, check_scale
+from solver.validation import finite, whole
 
 LINES = ("backbone", "holes", "rim")
 
@@ -53,13 +54,13 @@ class SpatialRobot:
 
     def __post_init__(self) -> None:
         check_numbers(self, LINES)
-        if not (math.isfinite(self.angle) and abs(math.sin(self.angle)) > 0.1):
+        object.__setattr__(self, "angle", finite("angle", self.angle))
+        if not abs(math.sin(self.angle)) > 0.1:
             raise ValueError(f"angle is {self.angle}; the cables must not be near one plane with the backbone")
-        if not (isinstance(self.rim_points, int) and 3 <= self.rim_points <= 64):
-            raise ValueError(f"rim_points is {self.rim_points!r}; it must be a whole number from 3 to 64")
-        if self.max_cable_mm is None:
-            object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, self.length_mm) / 2)
-        require_positive("max_cable_mm", self.max_cable_mm)
+        object.__setattr__(self, "rim_points", whole("rim_points", self.rim_points, 3, 64))
+        check_scale(self, self.length_mm)
+        check_points(self, self.lines * self.positions)
+        check_cable(self, min(math.pi * self.offset_mm, self.length_mm) / 2)
         bound = min(self.length_mm, self.segments * self.offset_mm * abs(math.sin(self.angle)))
         if not self.cable_limit_mm < bound:
             raise ValueError(f"max_cable_mm is {self.max_cable_mm}; it must be below {bound:.6g}")
@@ -108,6 +109,16 @@ class SpatialRobot:
     def positions(self) -> int:
         """Number of points of a line that can touch, node 0 included."""
         return self.segments * (self.between + 1) + 1
+
+    @property
+    def shortest_mm(self) -> float:
+        """Shortest length of the backbone, which is fixed [mm]."""
+        return self.length_mm
+
+    @property
+    def longest_mm(self) -> float:
+        """Longest length of the backbone, which is fixed [mm]."""
+        return self.length_mm
 
     @property
     def segment_mm(self) -> float:

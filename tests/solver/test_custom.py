@@ -119,7 +119,7 @@ def test_families_of_one_expression_share_a_library():
     ("change", "message"),
     [
         ({"sizes": (6,)}, r"sizes is \(6.0,\); its family takes 2 numbers"),
-        ({"reach": 8}, "reach is 8; the shape does not end within it"),
+        ({"reach": 8}, "reach is 8.0; the shape does not end within it"),
         ({"reach": -1}, "reach is -1; it must be positive"),
         ({"sizes": (6, 0)}, "is not negative at its centre"),
         ({"axis": (0, 0)}, r"axis is \(0, 0\)"),

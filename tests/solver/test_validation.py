@@ -76,7 +76,7 @@ def test_scene():
     [
         (
             Circle(center=(10, 80), radius=12),
-            r"Circle\(.*center=\(10.0, 80.0\), radius=12\) overlaps the straight robot by .* mm at node",
+            r"Circle\(.*center=\(10.0, 80.0\), radius=12.0\) overlaps the straight robot by .* mm at node",
         ),
         (HalfPlane(point=(7, 0), normal=(-1, 0)), "HalfPlane.* overlaps the straight robot by 1 mm"),
         (
@@ -126,7 +126,7 @@ def test_equilibrium_is_read_only(circles):
         (lambda: Polygon(corners=((0, 0), (1, 0)), radius=1), "corners has 2 points; it must have 3 to 8"),
         (lambda: Polygon(corners=((0, 0), (2, 0), (1, 0.5), (1, 2)), radius=1), "once round a convex polygon"),
         (lambda: Polygon(corners=((0, 0), (1, 0), (2, 0), (1, 2)), radius=1), "none straight"),
-        (lambda: Scene([Circle(center=(40, 0), radius=1)] * 33), "obstacles has 33 entries; a scene holds at most 32"),
+        (lambda: Scene([Circle(center=(40, 0), radius=1)] * 33), "obstacles has more than 32 entries; a scene holds at most 32"),
     ],
 )
 def test_shape(build, message):
