@@ -272,16 +272,23 @@ def assign(
     assignments: list[Any] = [None] * len(robots)
     waiting = list(range(len(robots)))
     for _ in range(MAX_DRAWS):
-        drawn = [_draw(task, solver.robot, generators[k], split) for k in waiting]
-        for k, assignment in zip(waiting, drawn, strict=True):
-            solver.assign(robots[k], assignment.scene)
-            assignments[k] = assignment
-        names = [robots[k] for k in waiting]
+        drawn, clear = [], []
+        for k in waiting:
+            assignment = _draw(task, solver.robot, generators[k], split)
+            if solver.leaves_clear(assignment.scene):
+                solver.assign(robots[k], assignment.scene)
+                assignments[k] = assignment
+                drawn.append(assignment)
+                clear.append(k)
+        if not clear:
+            continue
+        names = [robots[k] for k in clear]
         forces = np.array([assignment.desired_force for assignment in drawn], float)
         pulls = np.array([assignment.pull for assignment in drawn])
         found, reached = solver.reaches(names, forces, PROBE_MM, cable_limit_mm, pulls, task.target)
-        desired[waiting] = reached if task.force_vector else forces[:, None]
-        waiting = [k for k, success in zip(waiting, found, strict=True) if not success]
+        desired[clear] = reached if task.force_vector else forces[:, None]
+        done = {k for k, success in zip(clear, found, strict=True) if success}
+        waiting = [k for k in waiting if k not in done]
         if not waiting:
             return desired, assignments
     raise RuntimeError(

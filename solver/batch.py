@@ -10,7 +10,7 @@ import numpy as np
 
 from solver import _kernel
 from solver.equilibrium import BaseEquilibrium, Equilibrium
-from solver.geometry import gaps_of, touching_points
+from solver.geometry import touching_gaps, touching_points
 from solver.layout import CABLE, PLANE, Layout, Model, layout
 from solver.reference import ReferenceSolver
 from solver.robot import Robot
@@ -285,7 +285,7 @@ class BaseBatch(ABC):
             )
 
     def _straight_gaps(self, scene: Scene) -> np.ndarray:
-        return gaps_of(self.robot, scene, self._straight_points())
+        return touching_gaps(self.robot, scene, self._straight_points())
 
     def _move(self, robots: list[int]) -> None:
         self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations)

@@ -11,7 +11,7 @@ import numpy as np
 from solver._kernel import SHAPE_SIZE
 from solver.formulation import GapLaw, gap_function
 from solver.obstacles import SHARPEST, Extent, Obstacle, directions
-from solver.validation import Pair, Point, finite, instance, points, sequence, unit
+from solver.validation import Pair, Point, finite, instance, points, sequence, shown, unit, whole
 
 PLACE_SIZE = 5  # numbers of a shape before its sizes: centre, axis, growth
 BISECTIONS = 60
@@ -39,9 +39,19 @@ class Family:
             function: ``(point, sizes) → F``, smooth, negative inside and positive outside, its slope not zero on the
                 surface; the point (2) is counted from the centre of the shape [mm].
             sizes: How many numbers tell a shape of the family from the others.
+
+        Raises:
+            ValueError: If ``sizes`` is out of range, or the function does not return one expression.
+            TypeError: If ``function`` is none.
         """
+        if not callable(function):
+            raise TypeError(f"function is {shown(function)}; give a function (point, sizes) → F of CasADi symbols")
+        sizes = whole("sizes", sizes, 0, SHAPE_SIZE - PLACE_SIZE)
         point, values = ca.SX.sym("point", 2), ca.SX.sym("sizes", sizes)
-        return cls(ca.Function("family", [point, values], [function(point, values)]).serialize())
+        traced = function(point, values)
+        if not (isinstance(traced, ca.SX) and traced.is_scalar()):
+            raise ValueError(f"function returned {shown(traced)}; it must return one CasADi expression of the point")
+        return cls(ca.Function("family", [point, values], [traced]).serialize())
 
     @property
     def function(self) -> ca.Function:

@@ -38,7 +38,7 @@ def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
     return touchable
 
 
-def gaps_of(robot: AnyRobot, scene: Scene, points: np.ndarray) -> np.ndarray:
+def touching_gaps(robot: AnyRobot, scene: Scene, points: np.ndarray) -> np.ndarray:
     """Gaps of the points of a robot ``(p, k, d)``, infinite where they cannot touch, ``(m, p, k)`` [mm].
 
     Raises:
