@@ -48,7 +48,10 @@ class Family:
             raise TypeError(f"function is {shown(function)}; give a function (point, sizes) → F of CasADi symbols")
         sizes = whole("sizes", sizes, 0, SHAPE_SIZE - PLACE_SIZE)
         point, values = ca.SX.sym("point", 2), ca.SX.sym("sizes", sizes)
-        traced = function(point, values)
+        try:
+            traced = function(point, values)
+        except (RuntimeError, NotImplementedError) as error:  # of CasADi
+            raise ValueError(f"function is not one of CasADi symbols of a point and {sizes} sizes: {error}") from error
         if not (isinstance(traced, ca.SX) and traced.is_scalar()):
             raise ValueError(f"function returned {shown(traced)}; it must return one CasADi expression of the point")
         return cls(ca.Function("family", [point, values], [traced]).serialize())
@@ -192,6 +195,9 @@ def _flaw(family: Family, sizes: tuple[float, ...], reach: float) -> _Flaw | Non
         return np.asarray(law(points.T, (0.0, 0.0, 1.0, 0.0, 0.0, *sizes)))
 
     at = derivatives(outline)
+    unbounded = ~np.isfinite(at).all(axis=0)
+    if unbounded.any():
+        return _Flaw("the gap or its slope is not finite", tuple(outline[int(unbounded.argmax())].tolist()), SMOOTH)
     normals, nudge = at[1:3], NUDGE * reach
     size = np.hypot(*normals)
     outer, inner = (derivatives(outline + side * nudge * normals.T)[0] for side in (1, -1))
@@ -202,11 +208,10 @@ def _flaw(family: Family, sizes: tuple[float, ...], reach: float) -> _Flaw | Non
     beyond = np.stack([_values(family, sizes, outline + part * (rim - outline)) for part in parts])
     bend = np.abs(at[3] * normals[1] ** 2 - 2 * at[4] * normals[0] * normals[1] + at[5] * normals[0] ** 2)
     for flawed, what, remedy in (
-        (~np.isfinite(at).all(axis=0), "the gap or its slope is not finite", SMOOTH),
         (np.abs(at[0]) > SLOPE_TOLERANCE * reach, "the function jumps", SMOOTH),
         (np.abs(size - 1) > SLOPE_TOLERANCE, "the gap does not grow as the distance does, its slope is not 1", SMOOTH),
         ((inner >= 0) | (outer <= 0), "the gap is not negative just inside and positive just outside", SMOOTH),
-        (np.abs(rate - 1) > RATE_TOLERANCE, "the gap does not change as its slope says", SMOOTH),
+        (~(np.abs(rate - 1) <= RATE_TOLERANCE), "the gap does not change as its slope says", SMOOTH),
         (bend * SHARPEST * reach > 1, "the outline has a corner", "round it"),
         (
             (within >= 0).any(axis=0) | (beyond <= 0).any(axis=0),

@@ -215,8 +215,8 @@ def is_real(value: Any) -> bool:
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it, cut to a readable length."""
-    text = repr(value)
+    """A value as a message shows it, on one line and cut to a readable length."""
+    text = " ".join(repr(value).split())
     return text if len(text) <= SHOWN else text[:SHOWN] + "…"
 
 

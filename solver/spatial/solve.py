@@ -63,7 +63,8 @@ class SpatialSolver:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is something else.
         """
-        return self._follow(equilibrium.block, check_cables(self.robot, self.scene, equilibrium, cables_mm))
+        cables = check_cables(self.robot, self.scene, equilibrium, cables_mm)
+        return self._follow(equilibrium.block, cables)
 
     def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> np.ndarray:
         """Nodes of every shape accepted on the way of :meth:`step`, from the present one on, ``(k, n+1, 3)`` [mm].
