@@ -61,6 +61,8 @@ class BaseBatch(ABC):
         self.commands = np.zeros((self.count, self.model.cables + 1))
         self._fleet = self._make_fleet(obstacles, threads)
         self._all = list(range(self.count))
+        self._clear: Scene | None = None  # the scene last found to leave the straight robot clear
+        self._straight: np.ndarray | None = None  # points of the straight robot, when they are first asked for
         self._unrested = set(self._all)  # must be put at rest before they move
         most = robot.cable_limit_mm
         least = 0.0 if self.model.cables == 1 else -most
@@ -109,14 +111,23 @@ class BaseBatch(ABC):
                 f"for, {self.layout.obstacles}"
             )
         check_width(self.robot, scene)
-        check_clear(self.robot, scene, self._straight_gaps(scene))
+        if scene is not self._clear:
+            check_clear(self.robot, scene, self._straight_gaps(scene))
         self._fleet.assign(index, self._kernel_scene(scene))
         self._scenes[index] = scene
         self._unrested.add(index)
 
     def leaves_clear(self, scene: Scene) -> bool:
-        """Whether no obstacle of a scene overlaps the straight robot."""
-        return bool((self._straight_gaps(scene) >= 0).all())
+        """Whether no obstacle of a scene overlaps the straight robot.
+
+        Raises:
+            ValueError: If an obstacle is one of another space, or names a node that the robot does not have.
+            TypeError: If ``scene`` is something else.
+        """
+        instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+        clear = bool((self._straight_gaps(scene) >= 0).all())
+        self._clear = scene if clear else None
+        return clear
 
     def rest(self, robots: Sequence[int]) -> None:
         """Make some robots straight and unactuated again.
@@ -285,7 +296,9 @@ class BaseBatch(ABC):
             )
 
     def _straight_gaps(self, scene: Scene) -> np.ndarray:
-        return touching_gaps(self.robot, scene, self._straight_points())
+        if self._straight is None:
+            self._straight = np.ascontiguousarray(self._straight_points())
+        return touching_gaps(self.robot, scene, self._straight)
 
     def _move(self, robots: list[int]) -> None:
         self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations)

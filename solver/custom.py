@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from solver._kernel import SHAPE_SIZE
 from solver.formulation import GapLaw, gap_function
 from solver.obstacles import SHARPEST, Extent, Obstacle, directions
-from solver.validation import Pair, Point, finite, instance, points, sequence, shown, unit, whole
+from solver.validation import Pair, Point, finite, instance, sequence, shown, unit, whole
 
 PLACE_SIZE = 5  # numbers of a shape before its sizes: centre, axis, growth
 BISECTIONS = 60
@@ -150,12 +150,12 @@ class Custom(Obstacle):
         """The family's function at points from the centre, ``(k, 2) → (k,)``."""
         return _values(self.family, self.sizes, points)
 
-    def _law(self, places: Any) -> np.ndarray:
-        return self._derivatives(points(places, 2))[..., :3]
+    def measure(self, points: np.ndarray) -> np.ndarray:
+        """Gap and gradient at points that need no check, ``(..., 3)``."""
+        return self._derivatives(points)[..., :3]
 
     def _derivatives(self, points: np.ndarray) -> np.ndarray:
         """Gap, its slopes and its second derivatives xx, xy, yy at points ``(..., 2)``, ``(..., 6)``."""
-        points = np.asarray(points, dtype=float)
         values = gap_function(self.law)(points.reshape(-1, 2).T, self.parameters)
         return np.asarray(values).T.reshape(*points.shape[:-1], 6)
 

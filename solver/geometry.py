@@ -44,6 +44,7 @@ def touching_gaps(robot: AnyRobot, scene: Scene, points: np.ndarray) -> np.ndarr
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
     """
-    touchable = touchable_points(robot, scene)
-    gaps = np.array([obstacle.gap(points) for obstacle in scene]).reshape(touchable.shape)
-    return np.where(touchable, gaps, np.inf)
+    gaps = np.array([obstacle.measure(points)[..., 0] for obstacle in scene]).reshape(len(scene), *points.shape[:2])
+    if all(obstacle.nodes is None for obstacle in scene):
+        return gaps
+    return np.where(touchable_points(robot, scene), gaps, np.inf)

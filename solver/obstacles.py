@@ -15,9 +15,9 @@ from solver.validation import (
     Matrix,
     Pair,
     Point,
+    check_points,
     pair,
     point,
-    points,
     positive,
     sequence,
     shown,
@@ -175,7 +175,7 @@ class Obstacle(ABC):
         Raises:
             ValueError: If they are not finite or not of its space.
         """
-        return self._law(points)[..., 0]
+        return self.measure(check_points(points, self.space))[..., 0]
 
     def normal_at(self, points: np.ndarray) -> np.ndarray:
         """Gradient of the gap at points, the outward unit normal on the surface, shaped as they are.
@@ -183,13 +183,13 @@ class Obstacle(ABC):
         Raises:
             ValueError: If they are not finite or not of its space.
         """
-        return self._law(points)[..., 1:]
+        return self.measure(check_points(points, self.space))[..., 1:]
 
-    def _law(self, places: Any) -> np.ndarray:
-        places = points(places, self.space)
-        gaps = np.empty((*places.shape[:-1], self.space + 1))
+    def measure(self, points: np.ndarray) -> np.ndarray:
+        """Gap and gradient at points that need no check, a contiguous array of floats, ``(..., d + 1)``."""
+        gaps = np.empty((*points.shape[:-1], self.space + 1))
         measure = _kernel.measure_gaps if self.space == 2 else _kernel.measure_spatial_gaps
-        measure(SHAPES[self.kind], np.array(self.parameters), places, gaps)
+        measure(SHAPES[self.kind], np.array(self.parameters), points, gaps)
         return gaps
 
 

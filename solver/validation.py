@@ -47,6 +47,8 @@ def positive(name: str, value: Any, low: float = SMALLEST, high: float = LARGEST
     Raises:
         ValueError: Naming the value and the bound.
     """
+    if type(value) is float and low <= value <= high:
+        return value
     return number(name, value, low, high, f"positive and finite, from {low:.6g} to {high:.6g}")
 
 
@@ -101,6 +103,8 @@ def point(name: str, value: Any, space: int = 2) -> Point:
     Raises:
         ValueError: Naming what they are.
     """
+    if type(value) is tuple and len(value) == space and all(type(v) is float and abs(v) <= LARGEST for v in value):
+        return value
     wanted = ("a pair (x, y)" if space == 2 else "three coordinates (x, y, z)") + " of numbers"
     entries = sequence(name, value, wanted)
     if len(entries) != space or not all(map(is_real, entries)):
@@ -200,7 +204,7 @@ def array(name: str, value: Any, shape: Shape, low: Any, high: Any, bound: str) 
     return numbers
 
 
-def points(value: Any, space: int) -> np.ndarray:
+def check_points(value: Any, space: int) -> np.ndarray:
     """Return points of the plane or of space as an array of floats, ``(..., d)``.
 
     Raises:

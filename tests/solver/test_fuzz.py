@@ -123,7 +123,8 @@ def test_obstacles(case):
         return
     outline = obstacle.outline()
     assert np.isfinite(outline).all()
-    assert np.isfinite(obstacle.gap(np.zeros(obstacle.space))) or kind is Custom
+    assert np.isfinite(obstacle.gap(outline)).all()
+    assert np.isfinite(obstacle.normal_at(outline)).all()
     scene = Scene([obstacle])
     made = Solver if obstacle.space == 2 else SpatialSolver
     solver = survives(made, ROBOT if obstacle.space == 2 else SPATIAL_ROBOT, scene)
@@ -246,6 +247,7 @@ def test_batches(spatially, first, second, third):
     for call in (
         lambda: batch.assign(first, second),
         lambda: batch.assign(0, second),
+        lambda: batch.leaves_clear(first),
         lambda: batch.rest(first),
         lambda: batch.step(first),
         lambda: batch.step(cables[:1], second),

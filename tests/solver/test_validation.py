@@ -376,6 +376,8 @@ def test_a_scene_that_a_batch_refuses_changes_nothing(batch, circles, scene):
     with pytest.raises(ValueError, match=r"as many obstacles as it was made for|overlaps the straight robot"):
         batch.assign(2, circles(*scene))
     assert batch.scene(2) is kept
+    assert batch.leaves_clear(kept)
+    assert not batch.leaves_clear(circles((15, 100, 15)))
     batch.step(np.full(4, 5.0))
 
 
