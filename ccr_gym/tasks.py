@@ -27,7 +27,7 @@ from ccr_gym.observation import FORCE_SCALE_N
 from solver import Circle, HalfPlane, Robot, Scene
 from solver.batch import BaseBatch
 from solver.scene import MAX_OBSTACLES
-from solver.solve import check_width
+from solver.solve import check_core
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
 MAX_DRAWS = 1000
@@ -313,7 +313,7 @@ def check_robot(task: Task, robot: Any) -> None:
     """
     try:
         for scene in task.narrowest():
-            check_width(robot, scene)
+            check_core(robot, scene)
     except ValueError as error:
         raise ValueError(f"the narrowest obstacles of {task} cannot be: {error}") from error
 
@@ -358,18 +358,25 @@ def assign(
     assignments: list[Any] = [None] * len(robots)
     waiting = list(range(len(robots)))
     for _ in range(MAX_DRAWS):
-        drawn = [_draw(task, solver.robot, generators[k], split) for k in waiting]
-        for k, assignment in zip(waiting, drawn, strict=True):
-            solver.assign(robots[k], assignment.scene)
-            assignments[k] = assignment
-        names = [robots[k] for k in waiting]
+        drawn, clear = [], []
+        for k in waiting:
+            assignment = _draw(task, solver.robot, generators[k], split)
+            if solver.leaves_clear(assignment.scene):
+                solver.assign(robots[k], assignment.scene)
+                assignments[k] = assignment
+                drawn.append(assignment)
+                clear.append(k)
+        if not clear:
+            continue
+        names = [robots[k] for k in clear]
         forces = np.array([assignment.desired_force for assignment in drawn], float)
         pulls = np.array([assignment.pull for assignment in drawn])
         found, reached = solver.reaches(names, forces, PROBE_MM, cable_limit_mm, pulls, task.target)
         if task.force_vector:
             found &= np.linalg.norm(reached, axis=1) <= FORCE_SCALE_N
-        desired[waiting] = reached if task.force_vector else forces[:, None]
-        waiting = [k for k, success in zip(waiting, found, strict=True) if not success]
+        desired[clear] = reached if task.force_vector else forces[:, None]
+        done = {k for k, success in zip(clear, found, strict=True) if success}
+        waiting = [k for k in waiting if k not in done]
         if not waiting:
             return desired, assignments
     raise RuntimeError(

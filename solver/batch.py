@@ -1,5 +1,6 @@
 """Many robots alike, each in a scene of its own, moved by one call of the kernel."""
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
@@ -9,12 +10,16 @@ import numpy as np
 
 from solver import _kernel
 from solver.equilibrium import BaseEquilibrium, Equilibrium
+from solver.geometry import touching_gaps, touching_points
 from solver.layout import CABLE, PLANE, Layout, Model, layout
 from solver.reference import ReferenceSolver
 from solver.robot import Robot
-from solver.scene import Scene
-from solver.solve import check_core, kernel_robot, kernel_scene
+from solver.scene import MAX_OBSTACLES, Scene
+from solver.solve import check_clear, check_core, check_scene, kernel_robot, kernel_scene
 from solver.status import Status
+from solver.validation import LARGEST, array, instance, positive, sequence, shown, whole
+
+MAX_PULL_STEPS = 100_000  # of a trial pull
 
 
 class BaseBatch(ABC):
@@ -36,25 +41,36 @@ class BaseBatch(ABC):
         threads: Threads that share the work; the answer does not depend on them.
 
     Raises:
-        ValueError: If a number is not positive.
+        ValueError: If a number is out of range, or so many robots do not fit into memory.
+        TypeError: If the robot is something else.
     """
 
     model: ClassVar[Model]
+    robot_kind: ClassVar[type]
 
     def __init__(self, robot: Any, count: int, obstacles: int, threads: int = 1) -> None:
-        for name, value in (("count", count), ("threads", threads)):
-            if not (isinstance(value, int) and value > 0):
-                raise ValueError(f"{name} is {value!r}; it must be a positive whole number")
-        self.robot, self.count = robot, count
+        check_scene(robot, self.robot_kind, Scene(), self.model)
+        self.robot, self.count = robot, whole("count", count, 1, 2**31 - 1)
+        obstacles = whole("obstacles", obstacles, 0, MAX_OBSTACLES)
+        threads = whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "; more do not help")
         self.layout = self._make_layout(obstacles)
-        self.blocks = np.zeros((count, self.layout.size))
-        self.statuses = np.zeros(count, np.int64)
-        self.iterations = np.zeros(count, np.int64)
-        self.factorizations = np.zeros(count, np.int64)
-        self._scenes: list[Scene | None] = [None] * count
-        self.commands = np.zeros((count, self.model.cables + 1))
+        _check_memory(self.count, self.layout.size)
+        self.blocks = np.zeros((self.count, self.layout.size))
+        self.statuses = np.zeros(self.count, np.int64)
+        self.iterations = np.zeros(self.count, np.int64)
+        self.factorizations = np.zeros(self.count, np.int64)
+        self._scenes: list[Scene | None] = [None] * self.count
+        self.commands = np.zeros((self.count, self.model.cables + 1))
         self._fleet = self._make_fleet(obstacles, threads)
-        self._all = list(range(count))
+        self._all = list(range(self.count))
+        self._clear: Scene | None = None  # the scene last found to leave the straight robot clear
+        self._straight: np.ndarray | None = None  # points of the straight robot, when they are first asked for
+        self._unrested = set(self._all)  # must be put at rest before they move
+        most = robot.cable_limit_mm
+        least = 0.0 if self.model.cables == 1 else -most
+        self._low = np.array(self.model.cables * [least] + [robot.shortest_mm])
+        self._high = np.array(self.model.cables * [most] + [robot.longest_mm])
+        self._bound = f"from {least:.6g} to {most:.6g} (robot.max_cable_mm)"
 
     @abstractmethod
     def _make_layout(self, obstacles: int) -> Layout:
@@ -72,23 +88,64 @@ class BaseBatch(ABC):
     def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> BaseEquilibrium:
         """The result of a solve."""
 
+    @abstractmethod
+    def _straight_points(self) -> np.ndarray:
+        """The points of the straight robot that can touch, ``(p, k, d)`` [mm]."""
+
     def assign(self, index: int, scene: Scene) -> None:
-        """Put a robot, straight and unactuated, among other obstacles.
+        """Put a robot among other obstacles; it must be put at rest, by :meth:`rest`, before it moves.
+
+        The obstacles that it is among already change nothing.
 
         Raises:
-            ValueError: If an obstacle is narrow enough to slip between its points or names a node it does not have.
+            ValueError: As :class:`solver.Solver`, or if the scene has not as many obstacles as the batch was made for;
+                nothing has changed then.
+            TypeError: If ``scene`` is something else.
         """
+        index = self._index(index)
+        instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+        if scene == self._scenes[index]:
+            return
+        check_scene(self.robot, self.robot_kind, scene, self.model)
+        if len(scene) != self.layout.obstacles:
+            raise ValueError(
+                f"scene has {len(scene)} obstacles; a scene of this batch must have as many obstacles as it was made "
+                f"for, {self.layout.obstacles}"
+            )
         check_core(self.robot, scene)
+        if scene is not self._clear:
+            check_clear(self.robot, scene, self._straight_gaps(scene))
         self._fleet.assign(index, self._kernel_scene(scene))
         self._scenes[index] = scene
+        self._unrested.add(index)
+
+    def leaves_clear(self, scene: Scene) -> bool:
+        """Whether no obstacle of a scene overlaps the straight robot.
+
+        Raises:
+            ValueError: If an obstacle is one of another space, or names a node that the robot does not have.
+            TypeError: If ``scene`` is something else.
+        """
+        instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+        clear = bool((self._straight_gaps(scene) >= 0).all())
+        self._clear = scene if clear else None
+        return clear
 
     def rest(self, robots: Sequence[int]) -> None:
-        """Make some robots straight and unactuated again."""
-        self.blocks[robots] = 0.0
-        self.blocks[robots, self.layout.length_at] = self.robot.length_mm
-        self.commands[robots] = 0.0
-        self.commands[robots, -1] = self.robot.length_mm
-        self._move(list(robots))
+        """Make some robots straight and unactuated again.
+
+        Raises:
+            ValueError: If one is not there, named twice or not assigned to a scene; nothing has changed then.
+        """
+        which = self._indices(robots)
+        for robot in which:
+            self.scene(robot)
+        self.blocks[which] = 0.0
+        self.blocks[which, self.layout.length_at] = self.robot.length_mm
+        self.commands[which] = 0.0
+        self.commands[which, -1] = self.robot.length_mm
+        self._move(which)
+        self._unrested.difference_update(which)
 
     def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
         """Move the cables of all robots, or of some, as far as tension and obstacles allow.
@@ -98,26 +155,48 @@ class BaseBatch(ABC):
             robots: Which; ``None`` for all.
 
         Raises:
-            ValueError: If a command is out of range; nothing has moved then.
+            ValueError: If a command or a length in :attr:`blocks` is out of range, or a robot is not there, named twice
+                or not at rest since it was put among other obstacles; nothing has moved then.
         """
-        high = self.robot.cable_limit_mm
-        low = 0.0 if self.model.cables == 1 else -high
-        if not ((cable_mm >= low) & (cable_mm <= high)).all():
-            raise ValueError(f"cable_mm is {cable_mm}; all must be from {low:.6g} to {high:.6g}")
-        which = self._all if robots is None else list(robots)
-        self.commands[which, :-1] = np.reshape(cable_mm, (-1, self.model.cables))
-        self.move(which)
+        which = self._all if robots is None else self._indices(robots)
+        cables = self.model.cables
+        shape = (len(which),) if cables == 1 else (len(which), cables)
+        commands = array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
+        self._check_rested(which)
+        self._check_lengths(which)
+        self.commands[which, :-1] = commands.reshape(-1, cables)
+        self._move(which)
 
     def move(self, which: int | slice | list[int]) -> None:
-        """Move one robot, some or all to their commands, which must be in range."""
-        self._move([which] if isinstance(which, int) else which if isinstance(which, list) else self._all[which])
+        """Move one robot, some or all to their commands, which must be in range.
+
+        Raises:
+            ValueError: If a robot is not there, named twice or not at rest since it was put among other obstacles;
+                nothing has moved then.
+        """
+        if isinstance(which, slice):
+            robots = self._all[which]
+        elif isinstance(which, list):
+            robots = self._indices(which)
+        else:
+            robots = [self._index(which)]
+        self._check_rested(robots)
+        self._move(robots)
 
     def probe(self, commands: np.ndarray) -> np.ndarray:
         """The equilibria that all robots would move to, ``(N, size)``; they stay where they are.
 
         Args:
-            commands: As :attr:`commands`, in range.
+            commands: As :attr:`commands`.
+
+        Raises:
+            ValueError: If a command or a length in :attr:`blocks` is out of range, or a robot is not at rest since it
+                was put among other obstacles.
         """
+        bound = f"{self._bound}, and lengths from {self._low[-1]:.6g} to {self._high[-1]:.6g}"
+        commands = array("commands", commands, self.commands.shape, self._low, self._high, bound)
+        self._check_rested(self._all)
+        self._check_lengths(self._all)
         blocks, scratch = self.blocks.copy(), [np.zeros(self.count, np.int64) for _ in range(3)]
         self._fleet.step(self._all, commands, blocks, *scratch)
         return blocks
@@ -139,25 +218,37 @@ class BaseBatch(ABC):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Whether pulling some robots steadily from rest gets each to a contact force, and the force it gets to.
 
-        No step may end in anything but ``CONVERGED``, and the straight robot must be clear of the obstacles.
+        No step may end in anything but ``CONVERGED``.
 
         Args:
             robots: Which, assigned to their scenes; their states are left alone.
             forces: Force for each, ``(k,)`` [N].
-            increment_mm: Cable displacement of a step [mm].
-            limit_mm: Bound on the cable displacement [mm].
-            directions: Displacements of the cables per millimetre of pull, ``(k, cables)``; ``None`` for ones.
+            increment_mm: Cable displacement of a step, at least a hundred thousandth of the bound [mm].
+            limit_mm: Bound on the cable displacement, at most ``robot.max_cable_mm`` [mm].
+            directions: Displacements of the cables per millimetre of pull, at most 1 in size, in the plane not
+                negative, ``(k, cables)``; ``None`` for ones.
             obstacle: The obstacle whose contact force is meant; ``None`` for all together.
 
         Returns:
             ``(k,)`` bool, and the contact force on each robot at the end of its pull, ``(k, d)`` [N].
+
+        Raises:
+            ValueError: If a number is out of range, or a robot is not there, named twice or not assigned to a scene.
         """
-        forces = np.asarray(forces, float)
-        directions = np.ones((len(forces), self.model.cables)) if directions is None else directions
+        which = self._indices(robots)
+        for robot in which:
+            self.scene(robot)
+        count, most = len(which), self.robot.cable_limit_mm
+        forces = array("forces", forces, (count,), 0.0, LARGEST, "finite and not negative")
+        limit = positive("limit_mm", limit_mm, high=most)
+        increment = positive("increment_mm", increment_mm, limit / MAX_PULL_STEPS, LARGEST)
+        given = np.ones((count, self.model.cables)) if directions is None else directions
+        least = 0.0 if self.model.cables == 1 else -1.0
+        given = array("directions", given, (count, self.model.cables), least, 1.0, f"from {least:g} to 1")
+        target = -1 if obstacle is None else whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
+        reached = np.zeros((count, self.model.space))
         length = self.robot.length_mm
-        reached = np.zeros((len(forces), self.model.space))
-        target = -1 if obstacle is None else obstacle
-        found = self._fleet.reaches(list(robots), forces, target, directions, increment_mm, limit_mm, length, reached)
+        found = self._fleet.reaches(which, forces, target, given, increment, limit, length, reached)
         return np.array(found, bool), reached
 
     def scene(self, index: int) -> Scene:
@@ -166,25 +257,85 @@ class BaseBatch(ABC):
         Raises:
             ValueError: If it has not been assigned to a scene.
         """
-        scene = self._scenes[index]
+        scene = self._scenes[self._index(index)]
         if scene is None:
-            raise ValueError(f"robot {index} has not been assigned to a scene")
+            raise ValueError(f"robot {index} has not been assigned to a scene; call assign({index}, scene)")
         return scene
 
     def equilibrium(self, index: int) -> Any:
-        """A robot's present equilibrium, on its own."""
+        """A robot's present equilibrium, on its own.
+
+        Raises:
+            ValueError: If it is not at rest since it was put among other obstacles, or its block is none.
+        """
         scene = self.scene(index)
+        self._check_rested([index])
         work = int(self.iterations[index]), int(self.factorizations[index])
         return self._make_equilibrium(scene, self.blocks[index].copy(), Status(self.statuses[index]), *work)
 
+    def _index(self, index: int) -> int:
+        if type(index) is int and 0 <= index < self.count:
+            return index
+        return whole("the index of a robot", index, 0, self.count - 1, f"; the batch has {self.count} robots")
+
+    def _indices(self, robots: Sequence[int]) -> list[int]:
+        """Indices of robots, each once."""
+        which = list(map(self._index, sequence("robots", robots, "a list of indices")))
+        if len(set(which)) != len(which):
+            raise ValueError(f"robots is {shown(robots)}; it must name each robot once")
+        return which
+
+    def _check_rested(self, robots: list[int]) -> None:
+        """Refuse robots that another scene waits for."""
+        if not self._unrested:
+            return
+        for robot in self._unrested.intersection(robots):
+            self.scene(robot)
+            raise ValueError(f"robot {robot} was put among other obstacles; call rest([{robot}]) before it moves")
+
+    def _check_lengths(self, robots: list[int]) -> None:
+        """Refuse blocks that someone has written another length into, or what is none."""
+        lengths = self.blocks[:, self.layout.length_at]
+        lengths = lengths if robots is self._all else lengths[robots]
+        low, high = self._low[-1], self._high[-1]
+        if lengths.size and not (low <= lengths.min() and lengths.max() <= high):
+            raise ValueError(
+                f"lengths in blocks are {shown(lengths)}; all must be from {low:.6g} to {high:.6g}: call rest(robots)"
+            )
+
+    def _straight_gaps(self, scene: Scene) -> np.ndarray:
+        if self._straight is None:
+            self._straight = np.ascontiguousarray(self._straight_points())
+        return touching_gaps(self.robot, scene, self._straight)
+
     def _move(self, robots: list[int]) -> None:
         self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
+
+
+def _check_memory(count: int, size: int) -> None:
+    """Refuse more robots than their blocks fit into memory.
+
+    Raises:
+        ValueError: Naming both.
+    """
+    needed, there = 8 * count * size, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > there:
+        raise ValueError(
+            f"count is {count}; their blocks need {needed / 1e9:.3g} GB and this machine has {there / 1e9:.3g} GB: "
+            f"make batches of at most {there // (8 * size)}"
+        )
 
 
 class BatchSolver(BaseBatch):
     """Many robots in the plane, each moved as :class:`solver.Solver` would; see :class:`BaseBatch`."""
 
     model = PLANE
+    robot_kind = Robot
+
+    def _straight_points(self) -> np.ndarray:
+        nodes = np.zeros((self.robot.segments + 1, 3))
+        nodes[:, 1] = np.linspace(0.0, self.robot.length_mm, len(nodes))
+        return touching_points(self.robot, nodes)
 
     def _make_layout(self, obstacles: int) -> Layout:
         return layout(self.robot, obstacles)

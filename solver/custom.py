@@ -1,21 +1,24 @@
 """Obstacles of any smooth shape, given as a CasADi expression."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Self
+from typing import ClassVar, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
 
 from solver._kernel import SHAPE_SIZE
 from solver.formulation import GapLaw, gap_function
-from solver.obstacles import Extent, Obstacle, Pair, directions, pair, plus, unit
-from solver.robot import require_positive
+from solver.obstacles import SHARPEST, Extent, Obstacle, directions
+from solver.validation import Pair, Point, finite, instance, sequence, shown, unit, whole
 
 PLACE_SIZE = 5  # numbers of a shape before its sizes: centre, axis, growth
 BISECTIONS = 60
-RAY_POINTS = 33  # on each ray from the centre, where the largest disc inside is looked for
+RAY_SAMPLES = 32  # of the function and of the largest disc inside, from the centre to the outline, and on to the reach
+NUDGE = 1e-6  # to either side of the outline, over the reach
+SLOPE_TOLERANCE, RATE_TOLERANCE = 1e-6, 1e-3  # of the gap's slope on the outline, and of its change across it
+SMOOTH = "give a function that is smooth there, such as a distance, with a slope that is not zero on its surface"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +39,22 @@ class Family:
             function: ``(point, sizes) → F``, smooth, negative inside and positive outside, its slope not zero on the
                 surface; the point (2) is counted from the centre of the shape [mm].
             sizes: How many numbers tell a shape of the family from the others.
+
+        Raises:
+            ValueError: If ``sizes`` is out of range, or the function does not return one expression.
+            TypeError: If ``function`` is none.
         """
+        if not callable(function):
+            raise TypeError(f"function is {shown(function)}; give a function (point, sizes) → F of CasADi symbols")
+        sizes = whole("sizes", sizes, 0, SHAPE_SIZE - PLACE_SIZE)
         point, values = ca.SX.sym("point", 2), ca.SX.sym("sizes", sizes)
-        return cls(ca.Function("family", [point, values], [function(point, values)]).serialize())
+        try:
+            traced = function(point, values)
+        except (RuntimeError, NotImplementedError) as error:  # of CasADi
+            raise ValueError(f"function is not one of CasADi symbols of a point and {sizes} sizes: {error}") from error
+        if not (isinstance(traced, ca.SX) and traced.is_scalar()):
+            raise ValueError(f"function returned {shown(traced)}; it must return one CasADi expression of the point")
+        return cls(ca.Function("family", [point, values], [traced]).serialize())
 
     @property
     def function(self) -> ca.Function:
@@ -73,8 +89,11 @@ class Custom(Obstacle):
 
     Raises:
         ValueError: If a value is not finite, there are too few or too many sizes, the function is not negative at the
-            centre, or not positive all along the rim of the disc.
+            centre, or not positive all along the rim of the disc; or if on its outline, as far as it is sampled, the
+            gap is no distance, because the function has a step, a kink or no slope.
     """
+
+    lengths: ClassVar[tuple[str, ...]] = ("reach",)
 
     family: Family
     sizes: tuple[float, ...] = ()
@@ -84,17 +103,21 @@ class Custom(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "sizes", tuple(float(value) for value in self.sizes))
-        object.__setattr__(self, "center", pair("center", self.center))
+        instance("family", self.family, Family, "trace a function with Family.trace")
+        sizes = sequence("sizes", self.sizes, "a tuple of numbers")
+        object.__setattr__(self, "sizes", tuple(finite("a number of sizes", size) for size in sizes))
         object.__setattr__(self, "axis", unit("axis", self.axis, "of the shape's x axis"))
-        require_positive("reach", self.reach)
         expected, most = self.family.function.numel_in(1), SHAPE_SIZE - PLACE_SIZE
         if len(self.sizes) != expected or expected > most:
             raise ValueError(f"sizes is {self.sizes}; its family takes {expected} numbers, of at most {most}")
         if not self._values(np.zeros((1, 2))) < 0:
-            raise ValueError(f"the function of {self!r} is not negative at its centre")
+            raise ValueError(f"the function of a shape at {self.center} is not negative at its centre; turn its sign")
         if not np.all(self._values(self.reach * directions()) > 0):
             raise ValueError(f"reach is {self.reach}; the shape does not end within it, give a larger one")
+        flaw = _flaw(self.family, self.sizes, self.reach)
+        if flaw is not None:
+            x, y = self._turned(np.array(flaw.point)).tolist()
+            raise ValueError(f"{flaw.what} at the point ({x:.6g}, {y:.6g}) of the shape's outline; {flaw.remedy}")
 
     @property
     def law(self) -> GapLaw:
@@ -116,39 +139,100 @@ class Custom(Obstacle):
         """Points of its surface, ``(k, 2)`` [mm]."""
         return self.outline()
 
-    def shifted(self, by: Iterable[float]) -> Self:
-        """The same shape elsewhere."""
-        return replace(self, center=plus(self.center, by))
-
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
-        rays = directions()
-        near, far = np.zeros(len(rays)), np.full(len(rays), self.reach)
-        for _ in range(BISECTIONS):
-            middle = (near + far) / 2
-            outside = self._values(middle[:, None] * rays) > 0
-            near, far = np.where(outside, near, middle), np.where(outside, middle, far)
+        return self._turned(_outline(self.family, self.sizes, self.reach))
+
+    def _turned(self, points: np.ndarray) -> np.ndarray:
+        """Points of the family, at the centre and turned from x to the axis."""
         x, y = self.axis
-        return np.asarray(self.center + far[:, None] * rays @ np.array([[x, y], [-y, x]]))
+        return np.asarray(self.center + points @ np.array([[x, y], [-y, x]]))
+
+    def _radii(self) -> list[tuple[str, float]]:
+        return [("reach", self.reach), ("the sharpest radius", self.extent.fineness)]
 
     def _values(self, points: np.ndarray) -> np.ndarray:
         """The family's function at points from the centre, ``(k, 2) → (k,)``."""
-        return np.asarray(self.family.function(points.T, self.sizes)).ravel()
+        return _values(self.family, self.sizes, points)
 
-    def _law(self, points: np.ndarray) -> np.ndarray:
+    def measure(self, points: np.ndarray) -> np.ndarray:
+        """Gap and gradient at points that need no check, ``(..., 3)``."""
         return self._derivatives(points)[..., :3]
 
     def _derivatives(self, points: np.ndarray) -> np.ndarray:
         """Gap, its slopes and its second derivatives xx, xy, yy at points ``(..., 2)``, ``(..., 6)``."""
-        points = np.asarray(points, dtype=float)
         values = gap_function(self.law)(points.reshape(-1, 2).T, self.parameters)
         return np.asarray(values).T.reshape(*points.shape[:-1], 6)
+
+
+class _Flaw(NamedTuple):
+    """What is wrong with a shape, where, as the family counts points, and what to do about it."""
+
+    what: str
+    point: Point
+    remedy: str
+
+
+def _values(family: Family, sizes: tuple[float, ...], points: np.ndarray) -> np.ndarray:
+    """A family's function at points from the centre, ``(k, 2) → (k,)``."""
+    return np.asarray(family.function(points.T, sizes)).ravel()
+
+
+@lru_cache(maxsize=256)
+def _outline(family: Family, sizes: tuple[float, ...], reach: float) -> np.ndarray:
+    """Where rays from the centre leave a shape of a family, ``(k, 2)``."""
+    rays = directions()
+    near, far = np.zeros(len(rays)), np.full(len(rays), reach)
+    for _ in range(BISECTIONS):
+        middle = (near + far) / 2
+        outside = _values(family, sizes, middle[:, None] * rays) > 0
+        near, far = np.where(outside, near, middle), np.where(outside, middle, far)
+    return np.asarray(far[:, None] * rays)
+
+
+@lru_cache(maxsize=256)
+def _flaw(family: Family, sizes: tuple[float, ...], reach: float) -> _Flaw | None:
+    """What keeps the gap of a shape from being a distance near its outline, ``None`` if nothing does."""
+    outline = _outline(family, sizes, reach)
+    law = gap_function(GapLaw("custom", family, PLACE_SIZE + len(sizes), (4,)))
+
+    def derivatives(points: np.ndarray) -> np.ndarray:
+        return np.asarray(law(points.T, (0.0, 0.0, 1.0, 0.0, 0.0, *sizes)))
+
+    at = derivatives(outline)
+    unbounded = ~np.isfinite(at).all(axis=0)
+    if unbounded.any():
+        return _Flaw("the gap or its slope is not finite", tuple(outline[int(unbounded.argmax())].tolist()), SMOOTH)
+    normals, nudge = at[1:3], NUDGE * reach
+    size = np.hypot(*normals)
+    outer, inner = (derivatives(outline + side * nudge * normals.T)[0] for side in (1, -1))
+    rate = (outer - inner) / (2 * nudge)
+    parts = np.arange(1, RAY_SAMPLES) / RAY_SAMPLES
+    within = np.stack([_values(family, sizes, part * outline) for part in parts])
+    rim = reach * directions()
+    beyond = np.stack([_values(family, sizes, outline + part * (rim - outline)) for part in parts])
+    bend = np.abs(at[3] * normals[1] ** 2 - 2 * at[4] * normals[0] * normals[1] + at[5] * normals[0] ** 2)
+    for flawed, what, remedy in (
+        (np.abs(at[0]) > SLOPE_TOLERANCE * reach, "the function jumps", SMOOTH),
+        (np.abs(size - 1) > SLOPE_TOLERANCE, "the gap does not grow as the distance does, its slope is not 1", SMOOTH),
+        ((inner >= 0) | (outer <= 0), "the gap is not negative just inside and positive just outside", SMOOTH),
+        (~(np.abs(rate - 1) <= RATE_TOLERANCE), "the gap does not change as its slope says", SMOOTH),
+        (bend * SHARPEST * reach > 1, "the outline has a corner", "round it"),
+        (
+            (within >= 0).any(axis=0) | (beyond <= 0).any(axis=0),
+            "the ray from the centre meets the outline more than once",
+            "move the centre to where all of it can be seen, or make it of several shapes",
+        ),
+    ):
+        if flawed.any():
+            return _Flaw(what, tuple(outline[int(flawed.argmax())].tolist()), remedy)
+    return None
 
 
 @lru_cache(maxsize=256)
 def _extent(shape: Custom) -> Extent:
     outline = shape.outline()
-    shares = np.linspace(0, 1, RAY_POINTS)[:, None, None]
+    shares = np.linspace(0, 1, RAY_SAMPLES)[:, None, None]
     inside = (shape.center + shares * (outline - shape.center)).reshape(-1, 2)
     inradius = np.linalg.norm(inside[:, None] - outline, axis=2).min(axis=1).max()
     _, x, y, xx, xy, yy = shape._derivatives(outline).T

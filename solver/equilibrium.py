@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -13,6 +13,10 @@ from solver.layout import CABLE, LENGTH, TENSION, Layout, layout
 from solver.robot import Robot
 from solver.scene import Scene
 from solver.status import Status
+from solver.validation import instance, shown, whole
+
+STATUSES = tuple(Status)
+ROUNDING = 1e-6  # by which a node may be farther from the base than the length, over it
 
 
 class Optimality(NamedTuple):
@@ -47,7 +51,7 @@ class Residuals(NamedTuple):
     sign: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class BaseEquilibrium(ABC):
     """What equilibria in the plane and in space have in common.
 
@@ -63,7 +67,13 @@ class BaseEquilibrium(ABC):
         status: How the step that led here ended.
         iterations: Newton iterations of that step.
         factorizations: Factorisations of the Hessian in that step.
+
+    Raises:
+        ValueError: If the block is not one of this robot and scene.
+        TypeError: If the robot, the scene or the status is something else.
     """
+
+    robot_kind: ClassVar[type]
 
     robot: Any
     scene: Scene
@@ -73,7 +83,38 @@ class BaseEquilibrium(ABC):
     factorizations: int = 0
 
     def __post_init__(self) -> None:
+        instance("robot", self.robot, self.robot_kind, "the robot that was solved")
+        instance("scene", self.scene, Scene, "the scene that was solved")
+        instance("status", self.status, Status, "how the step ended")
+        object.__setattr__(self, "iterations", whole("iterations", self.iterations, 0, 2**62))
+        _check_block(self.block, self._layout, self.robot)
+        if self.block.base is not None:  # which others may write
+            object.__setattr__(self, "block", self.block.copy())
         self.block.flags.writeable = False
+
+    @classmethod
+    def solved(cls, robot: Any, scene: Scene, block: np.ndarray, status: int, *work: int) -> Self:
+        """The same without a check, of a block that the kernel has just written."""
+        made, assign = object.__new__(cls), object.__setattr__
+        block.flags.writeable = False
+        assign(made, "robot", robot)
+        assign(made, "scene", scene)
+        assign(made, "block", block)
+        assign(made, "status", STATUSES[status])
+        for name, value in zip(("iterations", "factorizations"), work, strict=True):
+            assign(made, name, value)
+        return made
+
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
+        return type(self), (self.robot, self.scene, self.block, self.status, self.iterations, self.factorizations)
+
+    def __repr__(self) -> str:
+        cables = ", ".join(f"{cable:.6g}" for cable in self._layout.cables(self.block))
+        tensions = ", ".join(f"{tension:.4g}" for tension in self._layout.tensions(self.block))
+        return (
+            f"<{type(self).__name__} {self.status.name}: {self.robot.segments} segments, {self.length_mm:.6g} mm long, "
+            f"{len(self.scene)} obstacles, {int(self.contact.sum())} contacts, cable {cables} mm, tension {tensions} N>"
+        )
 
     @property
     def length_mm(self) -> float:
@@ -192,13 +233,15 @@ class BaseEquilibrium(ABC):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Equilibrium(BaseEquilibrium):
     """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
 
     Frame: base at the origin, unactuated backbone along +y, cable on the +x side. The lines of points that can touch
     are those of ``robot.touch``, by default (backbone, cable). The attributes are those of :class:`BaseEquilibrium`.
     """
+
+    robot_kind: ClassVar[type] = Robot
 
     robot: Robot
 
@@ -285,6 +328,35 @@ class Equilibrium(BaseEquilibrium):
         parameters = [self.cable_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
         unknowns = [self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel(), mounts.ravel()]
         return np.concatenate(unknowns), np.array(parameters)
+
+
+def _check_block(block: np.ndarray, places: Layout, robot: Any) -> None:
+    """Refuse numbers that no equilibrium of a robot has, and that the kernel could not start from.
+
+    Raises:
+        ValueError: Naming what is wrong.
+    """
+    remedy = "take the block of an equilibrium of an equal robot and scene"
+    if not (isinstance(block, np.ndarray) and block.dtype == np.float64 and block.flags.c_contiguous):
+        raise ValueError(f"block is {shown(block)}; it must be a contiguous array of float64: {remedy}")
+    if block.shape != (places.size,):
+        raise ValueError(f"block has shape {block.shape}; it must be ({places.size},): {remedy}")
+    clearances = [places.gaps(block), places.clearance(block)]
+    if np.isnan(block).any() or np.isinf(block).sum() > sum(np.isposinf(part).sum() for part in clearances):
+        raise ValueError(f"block has numbers that are not finite; only gaps may be infinite: {remedy}")
+    low, high = robot.shortest_mm, robot.longest_mm
+    (length,) = places.length(block)
+    if not low <= length <= high:
+        raise ValueError(f"length_mm in block is {length}; it must be from {low:.6g} to {high:.6g}: {remedy}")
+    for name, part, bound in (
+        ("the displacement of a cable", places.cables(block), length),
+        ("a coordinate of a segment", places.coordinates(block), np.pi),
+        ("the distance of a node", places.nodes(block)[:, :2], (1 + ROUNDING) * length),
+    ):
+        if np.abs(part).max() > bound:
+            raise ValueError(f"{name} in block is {np.abs(part).max():.6g}; it must be at most {bound:.6g}: {remedy}")
+    if places.multipliers(block).min(initial=0.0) < 0:
+        raise ValueError(f"a multiplier in block is negative; none may be: {remedy}")
 
 
 def _tensions(balance: np.ndarray, equality_slopes: np.ndarray) -> np.ndarray:

@@ -15,10 +15,12 @@ from solver.equilibrium import Equilibrium
 from solver.free import clearance, fitted_slopes, free_tension
 from solver.operations import NUMBERS, Operations
 from solver.robot import Robot
+from solver.validation import LARGEST, array, finite, instance, pair, positive
 
 
 def force_true(equilibrium: Equilibrium) -> np.ndarray:
     """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 2)`` [N]."""
+    instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
     return equilibrium.forces.copy()
 
 
@@ -53,13 +55,30 @@ class VirtualWork:
         friction: Ratio μ of tangential to normal force, found from one experiment (:meth:`calibrated`).
         fit_range_mm: Range of cable displacement that straight lines are fitted over for the slopes, as in Fig. 7;
             ``None`` for the exact slopes where the robot is.
+
+    Raises:
+        ValueError: If a value is not finite, or the range does not grow from a displacement that is not negative.
     """
 
     friction: float = 0.0
     fit_range_mm: tuple[float, float] | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "friction", finite("friction", self.friction))
+        if self.fit_range_mm is not None:
+            low, high = pair("fit_range_mm", self.fit_range_mm)
+            if not 0 <= low < high:
+                raise ValueError(f"fit_range_mm is {self.fit_range_mm}; it must grow from 0 or more")
+            object.__setattr__(self, "fit_range_mm", (low, high))
+
     def estimate(self, equilibrium: Equilibrium) -> np.ndarray:
-        """Estimated contact force, ``(m, 2)`` [N]."""
+        """Estimated contact force, ``(m, 2)`` [N].
+
+        Raises:
+            ValueError: If ``fit_range_mm`` is outside the robot's range.
+            TypeError: If ``equilibrium`` is something else.
+        """
+        instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
         slopes = equilibrium.tip_slopes
         if self.fit_range_mm:
             slopes = fitted_slopes(equilibrium.robot.at(equilibrium.length_mm), *self.fit_range_mm)
@@ -84,11 +103,16 @@ class VirtualWork:
             offset_mm: Distance of the cable from the backbone [mm].
 
         Raises:
-            ValueError: If force or load is not positive.
+            ValueError: If a number is not finite, force, load or offset is not positive, or the tip does not move in y,
+                so that friction does no work.
         """
-        if not (force > 0 and load > 0):
-            raise ValueError(f"force is {force}, load is {load}; both must be positive")
-        return cls(friction=float((-offset_mm * load * slopes[2] / force - slopes[0]) / slopes[1]))
+        force, load, offset = positive("force", force), positive("load", load), positive("offset_mm", offset_mm)
+        x, y, turn = array("slopes", slopes, (3,), -LARGEST, LARGEST, "finite").tolist()
+        if y == 0:
+            raise ValueError(
+                f"slopes is {slopes}; the tip must move in y for friction to do work: pull the cable first"
+            )
+        return cls(friction=(-offset * load * turn / force - x) / y)
 
 
 def onset_tension(before: Equilibrium, now: Equilibrium) -> float:

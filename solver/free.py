@@ -7,9 +7,12 @@ import casadi as ca
 import numpy as np
 
 from solver.formulation import arc_function
-from solver.geometry import touchable_points, touching_points
+from solver.geometry import touching_gaps, touching_points
+from solver.layout import PLANE
 from solver.robot import Robot
 from solver.scene import Scene
+from solver.solve import check_scene
+from solver.validation import instance, number, whole
 
 NEWTON_ITERATIONS = 8
 
@@ -27,9 +30,13 @@ def tip_slopes(robot: Robot, cable_mm: float, node: int | None = None) -> np.nda
     """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm].
 
     With ``node``, those of the node of that index, as if the robot ended there.
+
+    Raises:
+        ValueError: If the displacement or the node is none of the robot's.
+        TypeError: If the robot is something else.
     """
-    node = robot.segments if node is None else node
     angle, chord, turn, stretch = _segment(robot, cable_mm)
+    node = robot.segments if node is None else _node(robot, node)
     middles = np.arange(node) + 0.5
     sines, cosines, turns = np.sin(middles * angle), np.cos(middles * angle), middles * turn
     return np.array(
@@ -41,17 +48,20 @@ def tip_slopes(robot: Robot, cable_mm: float, node: int | None = None) -> np.nda
     )
 
 
-def fitted_slopes(robot: Robot, low_mm: float, high_mm: float, node: int = -1) -> np.ndarray:
+def fitted_slopes(robot: Robot, low_mm: float, high_mm: float, node: int | None = None) -> np.ndarray:
     """Slopes of straight lines fitted to the free tip pose over a range of cable displacement (Fig. 7), as above.
 
     With ``node``, those of the node of that index.
 
     Raises:
-        ValueError: If the range is empty or outside the robot's.
+        ValueError: If the range is empty or outside the robot's, or the node is none of it.
+        TypeError: If the robot is something else.
     """
-    if not 0 <= low_mm < high_mm <= robot.cable_limit_mm:
+    node = _node(robot, robot.segments if node is None else node)
+    low, high = _cable(robot, low_mm), _cable(robot, high_mm)
+    if not low < high:
         raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within 0 to {robot.cable_limit_mm:.6g} mm")
-    cables = np.linspace(low_mm, high_mm, 101)
+    cables = np.linspace(low, high, 101).tolist()
     tips = np.array([free_nodes(robot, cable)[node] for cable in cables])
     return np.asarray(np.polyfit(cables, tips, 1)[0])
 
@@ -79,14 +89,30 @@ def free_tension(robot: Robot, cable_mm: float) -> float:
 
 
 def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
-    """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact."""
+    """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact.
+
+    Raises:
+        ValueError: If the displacement is none of the robot's, or the scene is out of all proportion to it.
+        TypeError: If the robot or the scene is something else.
+    """
+    check_scene(robot, Robot, scene, PLANE)
     points = touching_points(robot, free_nodes(robot, cable_mm))
-    touchable = touchable_points(robot, scene)
-    gaps = [obstacle.gap(points)[touched].min() for obstacle, touched in zip(scene, touchable, strict=True)]
-    return float(min(gaps, default=np.inf))
+    return float(touching_gaps(robot, scene, points).min(initial=np.inf))
+
+
+def _cable(robot: Robot, cable_mm: float) -> float:
+    """A cable displacement that the robot has."""
+    instance("robot", robot, Robot, "the free robot in closed form is one of the plane")
+    limit = robot.cable_limit_mm
+    return number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+
+
+def _node(robot: Robot, node: int) -> int:
+    return whole("node", node, 0, robot.segments)
 
 
 def _segment(robot: Robot, cable_mm: float) -> _Segment:
+    cable_mm = _cable(robot, cable_mm)
     pull, length, offset = cable_mm / robot.segments, robot.segment_mm, robot.offset_mm
     if robot.cable == "uniform":  # its shear vanishes
         turn = 1 / np.sqrt((robot.segments * offset) ** 2 - cable_mm**2 / 4)

@@ -36,3 +36,15 @@ def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
             points[:] = False
             points[:, :: robot.between + 1] = obstacle.touchable(robot.segments + 1)
     return touchable
+
+
+def touching_gaps(robot: AnyRobot, scene: Scene, points: np.ndarray) -> np.ndarray:
+    """Gaps of the points of a robot ``(p, k, d)``, infinite where they cannot touch, ``(m, p, k)`` [mm].
+
+    Raises:
+        ValueError: If an obstacle names a node that the robot does not have.
+    """
+    gaps = np.array([obstacle.measure(points)[..., 0] for obstacle in scene]).reshape(len(scene), *points.shape[:2])
+    if all(obstacle.nodes is None for obstacle in scene):
+        return gaps
+    return np.where(touchable_points(robot, scene), gaps, np.inf)

@@ -4,7 +4,9 @@ from collections import OrderedDict
 from typing import NamedTuple
 
 from solver.equilibrium import Equilibrium
-from solver.solve import Solver
+from solver.reference import ReferenceSolver
+from solver.solve import Solver, check_command
+from solver.validation import instance, whole
 
 
 class MemoStatistics(NamedTuple):
@@ -27,14 +29,14 @@ class TransitionMemo:
 
     Raises:
         ValueError: If ``capacity`` is not a positive whole number.
+        TypeError: If ``solver`` is something else.
     """
 
-    def __init__(self, solver: Solver, capacity: int = 4096) -> None:
-        if not (isinstance(capacity, int) and capacity > 0):
-            raise ValueError(f"capacity is {capacity!r}; it must be a positive whole number")
+    def __init__(self, solver: Solver | ReferenceSolver, capacity: int = 4096) -> None:
+        instance("solver", solver, (Solver, ReferenceSolver), "a memo stands in for a solver of the plane")
         self.robot, self.scene, self.rest = solver.robot, solver.scene, solver.rest
         self._step = solver.step
-        self._capacity = capacity
+        self._capacity = whole("capacity", capacity, 1, 2**31)
         self.clear()
 
     def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
@@ -51,9 +53,7 @@ class TransitionMemo:
         Raises:
             ValueError: As the solver; the memo stays as it was.
         """
-        robot, scene = equilibrium.robot, equilibrium.scene
-        if (robot is not self.robot and robot != self.robot) or (scene is not self.scene and scene != self.scene):
-            return self._step(equilibrium, cable_mm, length_mm)
+        cable_mm, length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         key = equilibrium.block.tobytes(), cable_mm, length_mm
         reached = self._reached.get(key)
         if reached is not None:
@@ -68,7 +68,7 @@ class TransitionMemo:
 
     def clear(self) -> None:
         """Forget all steps and start the statistics anew."""
-        self._reached: OrderedDict[tuple[bytes, float, float | None], Equilibrium] = OrderedDict()
+        self._reached: OrderedDict[tuple[bytes, float, float], Equilibrium] = OrderedDict()
         self._hits = self._misses = 0
 
     @property

@@ -5,19 +5,32 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from solver import _kernel
 from solver.formulation import CAPSULE, CIRCLE, ELLIPSE, HALF_PLANE, POLYGON, POLYGON_CORNERS, GapLaw
-from solver.robot import require_positive
-
-Pair = tuple[float, float]
-Place = tuple[float, ...]
-Matrix = tuple[Place, ...]
+from solver.validation import (
+    SMALLEST,
+    Matrix,
+    Pair,
+    Point,
+    check_points,
+    pair,
+    point,
+    positive,
+    sequence,
+    shown,
+    spring,
+    unit,
+    whole,
+)
 
 SHAPES = {kind: index for index, kind in enumerate(_kernel.SHAPES.split())}
+FARTHEST = 100.0  # place or size of an obstacle, over the robot's longest length
+MAX_NODES = 4097  # of a robot
+SHARPEST = 1e-9  # smallest radius of an obstacle's surface, over that length
 
 
 class Extent(NamedTuple):
@@ -30,7 +43,7 @@ class Extent(NamedTuple):
         fineness: Smallest radius of curvature of the surface [mm]; infinite for a wall.
     """
 
-    center: Place
+    center: Point
     radius: float
     inradius: float
     fineness: float
@@ -50,18 +63,21 @@ class Obstacle(ABC):
     """
 
     space: ClassVar[int] = 2  # dimension of its points
+    places: ClassVar[tuple[str, ...]] = ("center",)  # fields that are points, and move with it
+    lengths: ClassVar[tuple[str, ...]] = ("radius",)  # fields that are radii or sizes
 
     nodes: tuple[int, ...] | None = None
     stiffness: float | Matrix | None = None
 
     def __post_init__(self) -> None:
         if self.stiffness is not None:
-            object.__setattr__(self, "stiffness", _stiffness(self.stiffness, self.space))
+            object.__setattr__(self, "stiffness", spring("stiffness", self.stiffness, self.space))
         if self.nodes is not None:
-            nodes = tuple(int(node) for node in self.nodes)
-            if not nodes or min(nodes) < 0 or len(set(nodes)) != len(nodes):
-                raise ValueError(f"nodes is {self.nodes}; it must name at least one node, each once, from 0")
-            object.__setattr__(self, "nodes", nodes)
+            object.__setattr__(self, "nodes", _nodes(self.nodes))
+        for name in self.places:
+            object.__setattr__(self, name, point(name, getattr(self, name), self.space))
+        for name in self.lengths:
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
 
     @property
     @abstractmethod
@@ -100,9 +116,49 @@ class Obstacle(ABC):
         """Points of its surface where its gap is no distance, ``(k, 2)`` [mm]; none where it is one."""
         return np.empty((0, self.space))
 
-    @abstractmethod
     def shifted(self, by: Iterable[float]) -> Self:
-        """The same obstacle elsewhere, by a shift [mm]."""
+        """The same obstacle elsewhere, by a shift [mm].
+
+        Raises:
+            ValueError: If the shift is not as many finite numbers as there are dimensions.
+        """
+        shift = point("by", by, self.space)
+        places: dict[str, Any] = {name: plus(getattr(self, name), shift) for name in self.places}
+        return replace(self, **places)
+
+    def check_proportion(self, length_mm: float) -> None:
+        """Refuse an obstacle too far from a robot of some length, or too large or too sharp beside it.
+
+        Raises:
+            ValueError: Naming the value and the bound.
+        """
+        largest, smallest = FARTHEST * length_mm, SHARPEST * length_mm
+        remedy = (
+            f"{largest:.6g} mm, {FARTHEST:g} times the robot's longest length, or rounding of its gap would exceed the "
+            "solver's tolerance; use a HalfPlane, in space a HalfSpace, for a wall, or leave out what the robot cannot "
+            "reach"
+        )
+        for name, place in self._points():
+            if math.hypot(*place) > largest:
+                raise ValueError(
+                    f"{name} of {shown(self)} is {math.hypot(*place):.6g} mm from the base, beyond {remedy}"
+                )
+        for name, size in self._radii():
+            if size > largest:
+                raise ValueError(f"{name} of {shown(self)} is {size:.6g} mm, beyond {remedy}")
+            if size < smallest:
+                raise ValueError(
+                    f"{name} of {shown(self)} is {size:.6g} mm; it must be at least {smallest:.6g} mm, {SHARPEST:g} of "
+                    "the robot's longest length: round it more"
+                )
+
+    def _points(self) -> list[tuple[str, Point]]:
+        """Its points and their names."""
+        return [(name, getattr(self, name)) for name in self.places]
+
+    def _radii(self) -> list[tuple[str, float]]:
+        """Its radii and sizes and their names."""
+        return [(name, getattr(self, name)) for name in self.lengths]
 
     def touchable(self, nodes: int) -> np.ndarray:
         """Which of the nodes 0…n can touch it, ``(nodes,)`` bool.
@@ -110,6 +166,7 @@ class Obstacle(ABC):
         Raises:
             ValueError: If a named node does not exist.
         """
+        nodes = whole("nodes", nodes, 1, MAX_NODES)
         if self.nodes is None:
             return np.ones(nodes, dtype=bool)
         if max(self.nodes) >= nodes:
@@ -119,15 +176,23 @@ class Obstacle(ABC):
         return np.asarray(np.isin(np.arange(nodes), self.nodes))
 
     def gap(self, points: np.ndarray) -> np.ndarray:
-        """Gaps of points ``(..., 2)``, in space ``(..., 3)`` [mm]; positive outside."""
-        return self._law(points)[..., 0]
+        """Gaps of points ``(..., 2)``, in space ``(..., 3)`` [mm]; positive outside.
 
-    def normal_at(self, point: np.ndarray) -> np.ndarray:
-        """Gradient of the gap at points, the outward unit normal on the surface, shaped as they are."""
-        return self._law(point)[..., 1:]
+        Raises:
+            ValueError: If they are not finite or not of its space.
+        """
+        return self.measure(check_points(points, self.space))[..., 0]
 
-    def _law(self, points: np.ndarray) -> np.ndarray:
-        points = np.ascontiguousarray(points, dtype=float)
+    def normal_at(self, points: np.ndarray) -> np.ndarray:
+        """Gradient of the gap at points, the outward unit normal on the surface, shaped as they are.
+
+        Raises:
+            ValueError: If they are not finite or not of its space.
+        """
+        return self.measure(check_points(points, self.space))[..., 1:]
+
+    def measure(self, points: np.ndarray) -> np.ndarray:
+        """Gap and gradient at points that need no check, a contiguous array of floats, ``(..., d + 1)``."""
         gaps = np.empty((*points.shape[:-1], self.space + 1))
         measure = _kernel.measure_gaps if self.space == 2 else _kernel.measure_spatial_gaps
         measure(SHAPES[self.kind], np.array(self.parameters), points, gaps)
@@ -151,11 +216,6 @@ class Circle(Obstacle):
     center: Pair
     radius: float
 
-    def __post_init__(self) -> None:
-        Obstacle.__post_init__(self)
-        object.__setattr__(self, "center", pair("center", self.center))
-        require_positive("radius", self.radius)
-
     @property
     def parameters(self) -> tuple[float, ...]:
         """(x, y, r)."""
@@ -165,10 +225,6 @@ class Circle(Obstacle):
     def extent(self) -> Extent:
         """The disc itself."""
         return Extent(self.center, self.radius, self.radius, self.radius)
-
-    def shifted(self, by: Iterable[float]) -> Self:
-        """The circle elsewhere."""
-        return replace(self, center=plus(self.center, by))
 
     def outline(self) -> np.ndarray:
         """Points of the circle, ``(k, 2)`` [mm]."""
@@ -188,13 +244,14 @@ class HalfPlane(Obstacle):
     """
 
     law: ClassVar[GapLaw] = HALF_PLANE
+    places: ClassVar[tuple[str, ...]] = ("point",)
+    lengths: ClassVar[tuple[str, ...]] = ()
 
     point: Pair
     normal: Pair
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "point", pair("point", self.point))
         object.__setattr__(self, "normal", unit("normal", self.normal, "from the wall towards the robot"))
 
     @property
@@ -206,10 +263,6 @@ class HalfPlane(Obstacle):
     def extent(self) -> Extent:
         """Without bounds, and flat."""
         return Extent(self.point, math.inf, math.inf, math.inf)
-
-    def shifted(self, by: Iterable[float]) -> Self:
-        """The wall elsewhere."""
-        return replace(self, point=plus(self.point, by))
 
     def outline(self) -> np.ndarray:
         """The point of the surface, ``(1, 2)`` [mm]."""
@@ -230,6 +283,7 @@ class Ellipse(Obstacle):
     """
 
     law: ClassVar[GapLaw] = ELLIPSE
+    lengths: ClassVar[tuple[str, ...]] = ()
 
     center: Pair
     radii: Pair
@@ -237,11 +291,11 @@ class Ellipse(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "center", pair("center", self.center))
-        object.__setattr__(self, "radii", pair("radii", self.radii))
+        first, second = pair("radii", self.radii)
+        for radius in (first, second):
+            positive("a half-axis of radii", radius)
+        object.__setattr__(self, "radii", (first, second))
         object.__setattr__(self, "axis", unit("axis", self.axis, "of the first half-axis"))
-        for radius in self.radii:
-            require_positive("a half-axis of radii", radius)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -259,9 +313,9 @@ class Ellipse(Obstacle):
         """Points of its surface, ``(k, 2)`` [mm]."""
         return self.outline()
 
-    def shifted(self, by: Iterable[float]) -> Self:
-        """The ellipse elsewhere."""
-        return replace(self, center=plus(self.center, by))
+    def _radii(self) -> list[tuple[str, float]]:
+        small, large = sorted(self.radii)
+        return [("a half-axis", small), ("a half-axis", large), ("the sharpest radius", small * (small / large))]
 
     def outline(self) -> np.ndarray:
         """Points of the ellipse, ``(k, 2)`` [mm]."""
@@ -283,6 +337,7 @@ class Capsule(Obstacle):
     """
 
     law: ClassVar[GapLaw] = CAPSULE
+    places: ClassVar[tuple[str, ...]] = ("start", "end")
 
     start: Pair
     end: Pair
@@ -290,10 +345,7 @@ class Capsule(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "start", pair("start", self.start))
-        object.__setattr__(self, "end", pair("end", self.end))
-        require_positive("radius", self.radius)
-        if self.start == self.end:
+        if math.dist(self.start, self.end) < SMALLEST:
             raise ValueError(f"start and end are both {self.start}; they must differ (a Circle has one centre)")
 
     @property
@@ -306,10 +358,6 @@ class Capsule(Obstacle):
         """The disc about the middle of the line."""
         middle = ((self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2)
         return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, self.radius, self.radius)
-
-    def shifted(self, by: Iterable[float]) -> Self:
-        """The capsule elsewhere."""
-        return replace(self, start=plus(self.start, by), end=plus(self.end, by))
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
@@ -330,22 +378,24 @@ class Polygon(Obstacle):
     """
 
     law: ClassVar[GapLaw] = POLYGON
+    places: ClassVar[tuple[str, ...]] = ()
 
     corners: tuple[Pair, ...]
     radius: float
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        corners = tuple(pair("a corner", corner) for corner in self.corners)
+        given = sequence("corners", self.corners, "a tuple of pairs (x, y)")
+        corners = tuple(pair("a corner", corner) for corner in given[: POLYGON_CORNERS + 1])
         if not 3 <= len(corners) <= POLYGON_CORNERS:
-            raise ValueError(f"corners has {len(corners)} points; it must have 3 to {POLYGON_CORNERS}")
+            raise ValueError(f"corners has {len(given)} points; it must have 3 to {POLYGON_CORNERS}")
         turns = _turns(corners)
+        shortest = min(math.dist(*edge) for edge in zip(corners, corners[1:] + corners[:1], strict=True))
         if all(turn < 0 for turn in turns):
             corners, turns = corners[::-1], [-turn for turn in turns]
-        if not (all(turn > 0 for turn in turns) and sum(turns) < 3 * math.pi):
+        if not (all(turn > 0 for turn in turns) and sum(turns) < 3 * math.pi and shortest >= SMALLEST):
             raise ValueError(f"corners is {self.corners}; they must go once round a convex polygon, none straight")
         object.__setattr__(self, "corners", corners)
-        require_positive("radius", self.radius)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -362,81 +412,31 @@ class Polygon(Obstacle):
 
     def shifted(self, by: Iterable[float]) -> Self:
         """The polygon elsewhere."""
-        return replace(self, corners=tuple(plus(corner, by) for corner in self.corners))
+        shift = pair("by", by)
+        return replace(self, corners=tuple((x + shift[0], y + shift[1]) for x, y in self.corners))
+
+    def _points(self) -> list[tuple[str, Point]]:
+        return [("a corner", corner) for corner in self.corners]
 
     def outline(self) -> np.ndarray:
         """Points of its surface, ``(k, 2)`` [mm]."""
         return _rounded(np.array(self.corners), self.radius)
 
 
-def place(name: str, value: Iterable[float], space: int = 2) -> Place:
-    """As many finite numbers as the space has dimensions.
+def plus(place: Point, shift: Point) -> Point:
+    """A point moved by a shift."""
+    return tuple(a + b for a, b in zip(place, shift, strict=True))
 
-    Raises:
-        ValueError: Naming what they are.
-    """
-    wanted = "a pair (x, y)" if space == 2 else "three coordinates (x, y, z)"
+
+def _nodes(nodes: Any) -> tuple[int, ...]:
+    wanted = "a tuple of node indices, (14,) for one; it must name at least one node, each once, from 0"
     try:
-        numbers = tuple(float(v) for v in value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} is {value!r}; it must be {wanted} of numbers") from error
-    if len(numbers) != space:
-        raise ValueError(f"{name} is {value!r}; it must be {wanted} of numbers")
-    if not all(map(math.isfinite, numbers)):
-        raise ValueError(f"{name} is {value}; it must be finite")
-    return numbers
-
-
-def pair(name: str, value: Iterable[float]) -> Pair:
-    """Two finite numbers.
-
-    Raises:
-        ValueError: Naming what they are.
-    """
-    x, y = place(name, value)
-    return x, y
-
-
-def plus(point: Pair, by: Iterable[float]) -> Pair:
-    """A point of the plane moved by a shift."""
-    x, y = by
-    return point[0] + float(x), point[1] + float(y)
-
-
-def _stiffness(value: float | Matrix, space: int) -> Matrix:
-    try:
-        matrix = np.array(value, dtype=float)
-        matrix = np.diag([matrix] * space) if matrix.ndim == 0 else matrix.reshape(space, space)
-    except (TypeError, ValueError) as error:
-        form = "((kxx, kxy), (kxy, kyy))" if space == 2 else "of three rows"
-        raise ValueError(f"stiffness is {value!r}; it must be a number or a matrix {form}") from error
-    sound = np.isfinite(matrix).all() and (matrix == matrix.T).all()
-    if not (sound and np.linalg.eigvalsh(matrix)[0] > 0):
-        raise ValueError(f"stiffness is {value}; it must be finite, symmetric and positive definite")
-    return tuple(map(tuple, matrix.tolist()))
-
-
-def unit(name: str, value: Iterable[float], meaning: str) -> Pair:
-    """A direction of the plane, normalised.
-
-    Raises:
-        ValueError: If it has none, naming what it is for.
-    """
-    x, y = direction(name, value, meaning)
-    return x, y
-
-
-def direction(name: str, value: Iterable[float], meaning: str, space: int = 2) -> Place:
-    """A direction of the plane or of space, normalised.
-
-    Raises:
-        ValueError: If it has none, naming what it is for.
-    """
-    numbers = place(name, value, space)
-    size = math.hypot(*numbers)
-    if size == 0:
-        raise ValueError(f"{name} is ({', '.join('0' * space)}); give the direction {meaning}")
-    return tuple(number / size for number in numbers)
+        indices = tuple(whole("a node", node, 0, MAX_NODES - 1) for node in sequence("nodes", nodes, wanted))
+    except ValueError as error:
+        raise ValueError(f"nodes is {shown(nodes)}; it must be {wanted} to {MAX_NODES - 1}") from error
+    if not indices or len(set(indices)) != len(indices):
+        raise ValueError(f"nodes is {shown(nodes)}; it must be {wanted}")
+    return indices
 
 
 def _turns(corners: tuple[Pair, ...]) -> list[float]:

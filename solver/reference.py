@@ -14,10 +14,10 @@ from solver.forces import onset_tension
 from solver.formulation import limits, node_derivatives, node_problem
 from solver.free import free_angle, free_tension, tip_slopes
 from solver.geometry import touchable_points, touching_points
-from solver.layout import layout
+from solver.layout import PLANE, layout
 from solver.robot import Robot
 from solver.scene import Scene
-from solver.solve import check_clear, check_command, check_core
+from solver.solve import check_clear, check_command, check_core, check_scene
 from solver.status import Status
 
 # Displacements of the cable are over its offset a, places over the length L of the robot at its longest.
@@ -83,13 +83,14 @@ class ReferenceSolver:
         scene: The obstacles.
 
     Raises:
-        ValueError: If an obstacle overlaps the straight robot, is narrow enough to slip between its points, or names a
-            node the robot does not have.
+        ValueError: As :class:`solver.Solver`.
+        TypeError: As :class:`solver.Solver`.
     """
 
     _plugin, _options = "ipopt", OPTIONS
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
+        check_scene(robot, Robot, scene, PLANE)
         self.robot = robot
         self.scene = scene
         self._touchable = touchable_points(robot, scene)
@@ -98,7 +99,7 @@ class ReferenceSolver:
         self._limits = limits(robot)
         self._build()
         self._rest = self._equilibrium(self._free(0.0, robot.length_mm), Status.CONVERGED, 0)
-        check_clear(self._rest)
+        check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> Equilibrium:
         """The straight, unactuated robot."""
@@ -119,7 +120,7 @@ class ReferenceSolver:
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
-        length = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        cable_mm, length = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         present, iterations, largest = self._start(equilibrium), 0, LARGEST_STEP
         while (distance := self._apart(present, cable := self._goal(present, cable_mm), length)) > 0:
             part = min(1.0, largest / distance)

@@ -3,11 +3,21 @@
 import math
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Protocol
+
+from solver.validation import SMALLEST, number, positive, sequence, shown, whole
 
 LINES = ("backbone", "cable", "rim")
 CABLES = ("uniform", "sliding")
 ANGLES = 64  # at which the longest edge of a bent segment is looked for
+RIGIDITIES = (1e-60, 1e60)  # that leave EI/L² and EI/2l0, and the squares of forces, normal numbers [N·mm²]
+OFFSETS = (1e-4, 10.0)  # over the longest length: nearer ones leave too few digits of a cable's share
+LEAST_TENSION = 1e-6  # a limit of tension, over EI/(aL): the robot cannot bend below it
+LEAST_CABLE = 1e-6  # the largest displacement, over a
+LEAST_LENGTH = 1e-3  # shortest over longest length
+THICKEST = 0.9  # a disk, over the segment at its shortest
+MAX_POINTS = 2**18  # that can touch: of all lines together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,14 +61,15 @@ class Robot:
 
     def __post_init__(self) -> None:
         check_numbers(self, LINES)
-        self._check_disks()
-        if self.cable not in CABLES:
-            raise ValueError(f"cable is {self.cable!r}; it must be one of {', '.join(CABLES)}")
+        if not (isinstance(self.cable, str) and self.cable in CABLES):
+            raise ValueError(f"cable is {shown(self.cable)}; it must be one of {', '.join(CABLES)}")
         self._check_lengths()
-        if self.max_cable_mm is None:
-            object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, 0.5 * self.lengths_mm[0]))
-        require_positive("max_cable_mm", self.max_cable_mm)
-        bound = min(self.lengths_mm[0], 2 * self.segments * self.offset_mm)
+        shortest, longest = self.lengths_mm
+        check_scale(self, longest)
+        self._check_disks()
+        check_points(self, len(self.touch) * self.positions)
+        check_cable(self, min(math.pi * self.offset_mm, 0.5 * shortest))
+        bound = min(shortest, 2 * self.segments * self.offset_mm)
         if not self.cable_limit_mm < bound:
             raise ValueError(
                 f"max_cable_mm is {self.max_cable_mm}; it must be below {bound} "
@@ -66,25 +77,30 @@ class Robot:
             )
 
     def _check_disks(self) -> None:
-        if self.disk_radius_mm is None:
-            object.__setattr__(self, "disk_radius_mm", self.offset_mm)
-        require_positive("disk_radius_mm", self.disk_radius_mm)
-        shortest = min(self.length_range_mm or (self.length_mm,)) / self.segments
-        if not 0 <= self.disk_thickness_mm < shortest:
-            raise ValueError(
-                f"disk_thickness_mm is {self.disk_thickness_mm}; it must be from 0 to below {shortest:.6g}, "
-                "the length of a segment"
-            )
+        radius = self.offset_mm if self.disk_radius_mm is None else self.disk_radius_mm
+        low, high = (ratio * self.longest_mm for ratio in OFFSETS)
+        object.__setattr__(self, "disk_radius_mm", number("disk_radius_mm", radius, low, high))
+        most = THICKEST * self.shortest_mm / self.segments
+        bound = f"from 0 to {most:.6g}, {THICKEST} of a segment's length"
+        object.__setattr__(
+            self, "disk_thickness_mm", number("disk_thickness_mm", self.disk_thickness_mm, 0.0, most, bound)
+        )
 
     def _check_lengths(self) -> None:
         if self.length_range_mm is None:
             return
-        shortest, longest = self.length_range_mm
-        object.__setattr__(self, "length_range_mm", (float(shortest), float(longest)))
-        for bound in (shortest, longest):
-            require_positive("a bound of length_range_mm", bound)
+        bounds = sequence("length_range_mm", self.length_range_mm, "a pair (shortest, longest) of lengths")
+        if len(bounds) != 2:
+            raise ValueError(f"length_range_mm is {shown(bounds)}; it must be a pair (shortest, longest) of lengths")
+        shortest, longest = (positive("a bound of length_range_mm", bound) for bound in bounds)
+        object.__setattr__(self, "length_range_mm", (shortest, longest))
         if not shortest <= self.length_mm <= longest:
             raise ValueError(f"length_mm is {self.length_mm}; it must lie in length_range_mm {self.length_range_mm}")
+        if shortest < LEAST_LENGTH * longest:
+            raise ValueError(
+                f"length_range_mm is {self.length_range_mm}; the shortest must be at least {LEAST_LENGTH} of the "
+                f"longest, {LEAST_LENGTH * longest:.6g}"
+            )
 
     @classmethod
     def prototype(cls, *, max_tension: float = 15.0, segments: int = 18) -> "Robot":
@@ -101,27 +117,36 @@ class Robot:
         Raises:
             ValueError: If the length is outside its range.
         """
-        if length_mm == self.length_mm:
+        if type(length_mm) is float and length_mm == self.length_mm:
             return self
-        self.check_length(length_mm)
-        return replace(self, length_mm=length_mm)
+        return replace(self, length_mm=self.check_length(length_mm))
 
-    def check_length(self, length_mm: float) -> None:
-        """Refuse a length outside its range.
+    def check_length(self, length_mm: float) -> float:
+        """Return a length within its range as a float.
 
         Raises:
             ValueError: Naming the value and the range.
         """
         shortest, longest = self.lengths_mm
-        if not shortest <= length_mm <= longest:
-            raise ValueError(
-                f"length_mm is {length_mm}; it must be from {shortest:.6g} to {longest:.6g} (robot.length_range_mm)"
-            )
+        if type(length_mm) is float and shortest <= length_mm <= longest:
+            return length_mm
+        bound = f"from {shortest:.6g} to {longest:.6g} (robot.length_range_mm)"
+        return number("length_mm", length_mm, shortest, longest, bound)
 
     @property
     def lengths_mm(self) -> tuple[float, float]:
         """Shortest and longest length of the backbone [mm]."""
         return self.length_range_mm or (self.length_mm, self.length_mm)
+
+    @property
+    def shortest_mm(self) -> float:
+        """Shortest length of the backbone [mm]."""
+        return self.lengths_mm[0]
+
+    @property
+    def longest_mm(self) -> float:
+        """Longest length of the backbone [mm]."""
+        return self.lengths_mm[1]
 
     @property
     def segment_mm(self) -> float:
@@ -146,16 +171,7 @@ class Robot:
         A line beside the backbone is stretched where its segment bends away from it: by an arc up to where the disks
         meet, with a uniform cable by a shear up to where the cable has no more length to give.
         """
-        segment = self.lengths_mm[1] / self.segments
-        if self.cable == "sliding":
-            assert self.disk_radius_mm is not None
-            widest = min((segment - self.disk_thickness_mm) / self.disk_radius_mm, math.pi)
-            angles = [widest * k / ANGLES for k in range(1, ANGLES + 1)]
-            longest = [max(2 * (segment / t + abs(line)) * math.sin(t / 2) for t in angles) for line in self.lines_mm]
-        else:
-            turned = math.sqrt(segment**2 - (segment - self.cable_limit_mm / self.segments) ** 2) / self.offset_mm
-            longest = [segment + max(0.0, -line) * turned for line in self.lines_mm]
-        return tuple(max(segment, length) / (self.between + 1) for length in longest)
+        return _longest_edges(self)
 
     @property
     def stiffness(self) -> float:
@@ -167,6 +183,20 @@ class Robot:
         """``max_cable_mm`` with its default filled in [mm]."""
         assert self.max_cable_mm is not None
         return self.max_cable_mm
+
+
+@lru_cache(maxsize=64)
+def _longest_edges(robot: Robot) -> tuple[float, ...]:
+    segment = robot.longest_mm / robot.segments
+    if robot.cable == "sliding":
+        assert robot.disk_radius_mm is not None
+        widest = min((segment - robot.disk_thickness_mm) / robot.disk_radius_mm, math.pi)
+        angles = [widest * k / ANGLES for k in range(1, ANGLES + 1)]
+        longest = [max(2 * (segment / t + abs(line)) * math.sin(t / 2) for t in angles) for line in robot.lines_mm]
+    else:
+        turned = math.sqrt(segment**2 - (segment - robot.cable_limit_mm / robot.segments) ** 2) / robot.offset_mm
+        longest = [segment + max(0.0, -line) * turned for line in robot.lines_mm]
+    return tuple(max(segment, length) / (robot.between + 1) for length in longest)
 
 
 class AnyRobot(Protocol):
@@ -192,31 +222,70 @@ class AnyRobot(Protocol):
     def edges_mm(self) -> Sequence[float]:
         """Longest distance there can be between neighbouring points of each line [mm]."""
 
+    @property
+    def longest_mm(self) -> float:
+        """Longest length of the backbone [mm]."""
+
+    @property
+    def rigidity(self) -> float:
+        """Flexural rigidity EI of the backbone [N·mm²]."""
+
 
 def check_numbers(robot: Any, lines: tuple[str, ...]) -> None:
-    """Refuse what no robot can have; its ``touch`` becomes a tuple, of some of these lines.
+    """Refuse what no robot can have; its numbers become floats and ints, its ``touch`` a tuple, of some of these lines.
 
     Raises:
         ValueError: Naming the value and the bound.
     """
-    for name in ("length_mm", "offset_mm", "rigidity"):
-        require_positive(name, getattr(robot, name))
-    if not (isinstance(robot.segments, int) and 2 <= robot.segments <= 4096):
-        raise ValueError(f"segments is {robot.segments!r}; it must be a whole number from 2 to 4096")
-    if not robot.max_tension > 0:
-        raise ValueError(f"max_tension is {robot.max_tension}; it must be positive (math.inf lifts the limit)")
-    object.__setattr__(robot, "touch", tuple(robot.touch))
-    if not robot.touch or len(set(robot.touch)) != len(robot.touch) or not set(robot.touch) <= set(lines):
-        raise ValueError(f"touch is {robot.touch}; it must name some of {lines}, each once")
-    if not (isinstance(robot.between, int) and 0 <= robot.between <= 256):
-        raise ValueError(f"between is {robot.between!r}; it must be a whole number from 0 to 256")
+    assign = object.__setattr__
+    for name in ("length_mm", "offset_mm"):
+        assign(robot, name, positive(name, getattr(robot, name)))
+    assign(robot, "rigidity", positive("rigidity", robot.rigidity, *RIGIDITIES))
+    assign(robot, "segments", whole("segments", robot.segments, 2, 4096))
+    assign(robot, "between", whole("between", robot.between, 0, 256))
+    bound = "positive (math.inf lifts the limit)"
+    assign(robot, "max_tension", number("max_tension", robot.max_tension, SMALLEST, math.inf, bound))
+    wanted = f"a tuple of some of {lines}, each once, as ({lines[0]!r},)"
+    touch = sequence("touch", robot.touch, wanted)
+    named = all(isinstance(line, str) and line in lines for line in touch)
+    if not touch or not named or len(set(touch)) != len(touch):
+        raise ValueError(f"touch is {shown(robot.touch)}; it must be {wanted}")
+    assign(robot, "touch", tuple(touch))
 
 
-def require_positive(name: str, value: float | None) -> None:
-    """Refuse what is not a positive, finite number.
+def check_scale(robot: Any, longest: float) -> None:
+    """Refuse numbers that are out of all proportion to the robot's longest length.
 
     Raises:
-        ValueError: Naming the value.
+        ValueError: Naming the value and the bound.
     """
-    if value is None or not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name} is {value}; it must be positive and finite")
+    low, high = (ratio * longest for ratio in OFFSETS)
+    number("offset_mm", robot.offset_mm, low, high, f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length")
+    least = LEAST_TENSION * robot.rigidity / (robot.offset_mm * longest)
+    bound = f"at least {least:.6g}, {LEAST_TENSION} of EI/(a·L), to bend the robot at all (math.inf lifts the limit)"
+    number("max_tension", robot.max_tension, least, math.inf, bound)
+
+
+def check_points(robot: Any, count: int) -> None:
+    """Refuse more points that can touch than there is room for.
+
+    Raises:
+        ValueError: Naming the numbers and the bound.
+    """
+    if count > MAX_POINTS:
+        raise ValueError(
+            f"segments is {robot.segments} and between is {robot.between}; with {len(robot.touch)} kinds of lines in "
+            f"touch these are {count} points that can touch, and at most {MAX_POINTS} are allowed: divide less finely"
+        )
+
+
+def check_cable(robot: Any, default: float) -> None:
+    """Fill in the largest displacement of a cable, and refuse one that is no number or too small to matter.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    largest = default if robot.max_cable_mm is None else positive("max_cable_mm", robot.max_cable_mm)
+    least = LEAST_CABLE * robot.offset_mm
+    number("max_cable_mm", largest, least, math.inf, f"at least {least:.6g}, {LEAST_CABLE} of offset_mm")
+    object.__setattr__(robot, "max_cable_mm", largest)

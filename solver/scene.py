@@ -1,5 +1,6 @@
 """The obstacles a robot is among."""
 
+import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from solver.formulation import GapLaw
 from solver.obstacles import Obstacle
+from solver.validation import shown
 
 MAX_OBSTACLES = 32
 
@@ -26,14 +28,16 @@ class Scene:
     obstacles: tuple[Obstacle, ...]
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
-        object.__setattr__(self, "obstacles", tuple(obstacles))
+        if isinstance(obstacles, Obstacle) or not isinstance(obstacles, Iterable):
+            raise TypeError(f"obstacles is {shown(obstacles)}; give a list of obstacles, [] for none")
+        object.__setattr__(self, "obstacles", tuple(itertools.islice(obstacles, MAX_OBSTACLES + 1)))
         if len(self.obstacles) > MAX_OBSTACLES:
-            raise ValueError(f"obstacles has {len(self.obstacles)} entries; a scene holds at most {MAX_OBSTACLES}")
+            raise ValueError(f"obstacles has more than {MAX_OBSTACLES} entries; a scene holds at most {MAX_OBSTACLES}")
         for obstacle in self.obstacles:
             if not isinstance(obstacle, Obstacle):
                 raise TypeError(
-                    f"{obstacle!r} is not an obstacle; give a Circle, HalfPlane, Ellipse, Capsule, Polygon or Custom, "
-                    "or in space one of solver.spatial"
+                    f"{shown(obstacle)} is not an obstacle; give a Circle, HalfPlane, Ellipse, Capsule, Polygon or "
+                    "Custom, or in space one of solver.spatial"
                 )
         if len({obstacle.space for obstacle in self.obstacles}) > 1:
             raise ValueError("obstacles has some of the plane and some of space; a scene holds one kind")

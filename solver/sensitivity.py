@@ -12,6 +12,8 @@ import numpy as np
 
 from solver.equilibrium import BaseEquilibrium, Equilibrium
 from solver.formulation import kkt_derivatives, limits
+from solver.scene import MAX_OBSTACLES
+from solver.validation import instance, shown, whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,12 @@ CABLE, LENGTH = 0, 1  # rows of a Sensitivity
 
 
 def obstacle_rows(obstacle: int) -> slice:
-    """Rows of a :class:`Sensitivity` that belong to an obstacle: x, y, turn, radius."""
+    """Rows of a :class:`Sensitivity` that belong to an obstacle: x, y, turn, radius.
+
+    Raises:
+        ValueError: If it is not the index of an obstacle.
+    """
+    obstacle = whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
     return slice(2 + 4 * obstacle, 6 + 4 * obstacle)
 
 
@@ -56,8 +63,11 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
             one that only just touches gives the derivative on the side where it is pressed.
 
     Raises:
-        ValueError: If a uniform cable is not pulled, or ``active`` has the wrong shape.
+        ValueError: If a uniform cable is not pulled, or ``active`` has the wrong shape, or contacts that cannot all be
+            closed at once.
+        TypeError: If ``equilibrium`` is something else.
     """
+    instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
     robot, scene = equilibrium.robot, equilibrium.scene
     sliding = robot.cable == "sliding"
     if not sliding and not equilibrium.cable_mm > 0:
@@ -108,13 +118,16 @@ def respond(equilibrium: BaseEquilibrium, kkt: ca.Function, active: np.ndarray |
         held: Which of the inequalities before the contacts stay closed.
 
     Raises:
-        ValueError: If ``active`` has the wrong shape.
+        ValueError: If ``active`` has the wrong shape, or contacts that cannot all be closed at once.
     """
     active = equilibrium.contact if active is None else active
-    if active.shape != equilibrium.contact.shape:
+    if not (isinstance(active, np.ndarray) and active.dtype == bool and active.shape == equilibrium.contact.shape):
+        has = f"has shape {active.shape} of {active.dtype}" if isinstance(active, np.ndarray) else f"is {shown(active)}"
         raise ValueError(
-            f"active has shape {active.shape}; it must have that of the multipliers, {equilibrium.contact.shape}"
+            f"active {has}; it must be an array of bool, shaped as the multipliers, {equilibrium.contact.shape}"
         )
+    if (active & ~np.isfinite(equilibrium.gaps)).any():
+        raise ValueError("active has contacts of points that cannot touch the obstacle; close others")
     touching = active[:, :, 1:].ravel()
     conditions, varied, loads, load_slopes = (value.full() for value in kkt(*equilibrium.node_solution()))
     unknowns = conditions.shape[1]
@@ -125,7 +138,10 @@ def respond(equilibrium: BaseEquilibrium, kkt: ca.Function, active: np.ndarray |
     matrix = np.zeros((count, count))
     matrix[:, :unknowns] = slopes
     matrix[:unknowns, unknowns:] = -slopes[unknowns:].T
-    change = np.linalg.solve(matrix, -varied)
+    try:
+        change = np.linalg.solve(matrix, -varied)
+    except np.linalg.LinAlgError as error:
+        raise ValueError(f"active has {touching.sum()} contacts that depend on each other; close fewer") from error
     # The loads are L_v, so their slopes in (z, ν, λ) are those of (L_z, −equalities, −gaps) in v.
     signed = varied.copy()
     signed[unknowns:] *= -1

@@ -10,11 +10,13 @@ from solver._kernel import SHAPE_SIZE
 from solver.compile import law_address
 from solver.equilibrium import BaseEquilibrium, Equilibrium, Optimality
 from solver.geometry import touchable_points
-from solver.layout import LENGTH
+from solver.layout import LENGTH, PLANE, Model
 from solver.obstacles import SHAPES
 from solver.robot import AnyRobot, Robot
 from solver.scene import Scene
-from solver.status import Status
+from solver.validation import instance, number, shown
+
+SPRINGS = (1e-10, 1e10)  # stiffness of an obstacle's spring, over EI/L³ of the robot
 
 
 class Trace(NamedTuple):
@@ -37,7 +39,9 @@ def read_trace(numbers: list[float], robot: AnyRobot, scene: Scene, space: int) 
     parts = ((robot.segments + 1, 3), (len(robot.lines_mm), robot.positions, space), (len(scene), space))
     ends = np.cumsum([math.prod(part) for part in parts])
     rows = np.reshape(numbers, (-1, int(ends[-1])))
-    return Trace(*(columns.reshape(-1, *part) for columns, part in zip(np.split(rows, ends[:-1], 1), parts, strict=True)))
+    return Trace(
+        *(columns.reshape(-1, *part) for columns, part in zip(np.split(rows, ends[:-1], 1), parts, strict=True))
+    )
 
 
 class Solver:
@@ -51,12 +55,14 @@ class Solver:
         scene: The obstacles.
 
     Raises:
-        ValueError: If an obstacle overlaps the straight robot, is small enough to slip between its points, or names a
-            node the robot does not have.
+        ValueError: If an obstacle is one of space, overlaps the straight robot, is small enough to slip between its
+            points, names a node the robot does not have, or is out of all proportion to it.
+        TypeError: If the robot or the scene is something else.
         RuntimeError: If a :class:`~solver.custom.Custom` shape cannot be compiled.
     """
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
+        check_scene(robot, Robot, scene, PLANE)
         self.robot = robot
         self.scene = scene
         check_core(robot, scene)
@@ -64,7 +70,7 @@ class Solver:
         straight = np.zeros(self._kernel.block_size)
         straight[LENGTH] = robot.length_mm
         self._rest = self._follow(straight, 0.0, robot.length_mm)
-        check_clear(self._rest)
+        check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> Equilibrium:
         """The straight, unactuated robot."""
@@ -86,8 +92,9 @@ class Solver:
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is something else.
         """
-        length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        cable_mm, length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         return self._follow(equilibrium.block, cable_mm, length_mm)
 
     def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Trace:
@@ -98,7 +105,7 @@ class Solver:
         Raises:
             ValueError: As :meth:`step`.
         """
-        length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        cable_mm, length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
         return read_trace(self._kernel.trace(equilibrium.block, (cable_mm, length_mm)), self.robot, self.scene, 2)
 
     def optimality(self, equilibrium: Equilibrium) -> Optimality:
@@ -112,8 +119,9 @@ class Solver:
 
     def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
-        status, iterations, factorizations = self._kernel.step(block, cable_mm, length_mm, reached)
-        return Equilibrium(self.robot, self.scene, reached, Status(status), iterations, factorizations)
+        return Equilibrium.solved(
+            self.robot, self.scene, reached, *self._kernel.step(block, cable_mm, length_mm, reached)
+        )
 
 
 def kernel_robot(robot: Robot) -> _kernel.Robot:
@@ -158,7 +166,9 @@ def scene_arrays(robot: AnyRobot, scene: Scene) -> SceneArrays:
     return (
         [SHAPES[obstacle.kind] for obstacle in scene],
         np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
-        np.array([(*center, radius, fineness, inradius) for center, radius, inradius, fineness in extents], dtype=float),
+        np.array(
+            [(*extent.center, extent.radius, extent.fineness, extent.inradius) for extent in extents], dtype=float
+        ),
         touchable_points(robot, scene).reshape(len(scene), len(robot.lines_mm) * robot.positions),
         np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
         [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
@@ -178,48 +188,78 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
         if (touchable[1:] & touchable[:-1]).any() and not 2 * inradius > longest:
             between = math.floor(longest * (robot.between + 1) / (2 * inradius))
             raise ValueError(
-                f"the largest disc or ball in {obstacle!r} has the radius {inradius:.3g} mm; it could slip between points "
-                f"of the robot, up to {longest:.3g} mm apart: give the robot between={between} or more"
+                f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.3g} mm; it could slip between "
+                f"points of the robot, up to {longest:.3g} mm apart: give the robot between={between} or more"
             )
 
 
-def check_clear(rest: BaseEquilibrium) -> None:
-    """Refuse obstacles that overlap the straight robot.
+def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
+    """Refuse obstacles that overlap the straight robot, whose gaps are given, ``(m, p, k)``.
 
     Raises:
         ValueError: Naming the obstacle, the node and the depth.
     """
-    for obstacle, gaps in zip(rest.scene, rest.gaps, strict=True):
-        if gaps.min() < 0:
-            node = int(np.unravel_index(gaps.argmin(), gaps.shape)[1]) // (rest.robot.between + 1)
-            raise ValueError(f"{obstacle!r} overlaps the straight robot by {-gaps.min():.3g} mm at node {node}")
+    for obstacle, own in zip(scene, gaps, strict=True):
+        if own.min() < 0:
+            node = int(np.unravel_index(own.argmin(), own.shape)[1]) // (robot.between + 1)
+            raise ValueError(f"{shown(obstacle)} overlaps the straight robot by {-own.min():.3g} mm at node {node}")
+
+
+def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None:
+    """Refuse a robot and a scene that a solver has no use for, or that are out of all proportion to each other.
+
+    Raises:
+        TypeError: If they are not of the classes asked for.
+        ValueError: Naming the obstacle, the value and the bound.
+    """
+    instance("robot", robot, kind, "robots of the plane are solver.Robot, those of space solver.spatial.SpatialRobot")
+    instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+    for obstacle in scene:
+        if obstacle.space != model.space:
+            names = ("the plane", "solver.spatial") if model.space == 3 else ("space", "solver")
+            raise ValueError(f"{shown(obstacle)} is an obstacle of {names[0]}; give one of {names[1]}")
+        obstacle.check_proportion(robot.longest_mm)
+        if obstacle.stiffness is not None:
+            _check_spring(robot, obstacle.stiffness_matrix)
+
+
+def _check_spring(robot: AnyRobot, stiffness: np.ndarray) -> None:
+    low, high = (ratio * robot.rigidity / robot.longest_mm**3 for ratio in SPRINGS)
+    least, *_, most = np.linalg.eigvalsh(stiffness)
+    if not low <= least <= most <= high:
+        raise ValueError(
+            f"stiffness is from {least:.6g} to {most:.6g} N/mm; it must be from {low:.6g} to {high:.6g} N/mm, "
+            f"{SPRINGS[0]:g} to {SPRINGS[1]:g} of the robot's EI/L³: leave out a softer obstacle, fix a stiffer one"
+        )
 
 
 def check_command(
     robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None
-) -> float:
-    """Refuse a command out of range and an equilibrium of another robot or scene; returns the length asked for.
+) -> tuple[float, float]:
+    """Refuse a command out of range and an equilibrium of another robot or scene; returns the command as floats.
 
     Raises:
         ValueError: Naming the value and the bound.
+        TypeError: If the equilibrium is something else.
     """
-    if not (math.isfinite(cable_mm) and 0 <= cable_mm <= robot.cable_limit_mm):
-        raise ValueError(
-            f"cable_mm is {cable_mm}; it must be from 0 to {robot.cable_limit_mm:.6g} (robot.max_cable_mm)"
-        )
-    check_origin(robot, scene, equilibrium)
+    limit = robot.cable_limit_mm
+    if not (type(cable_mm) is float and 0 < cable_mm <= limit):
+        cable_mm = number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+    check_origin(robot, scene, equilibrium, Equilibrium)
     if length_mm is None:
-        return equilibrium.length_mm
-    robot.check_length(length_mm)
-    return length_mm
+        return cable_mm, equilibrium.length_mm
+    return cable_mm, robot.check_length(length_mm)
 
 
-def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium) -> None:
+def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium, kind: type) -> None:
     """Refuse an equilibrium of another robot or scene.
 
     Raises:
         ValueError: Saying which of them differs.
+        TypeError: If it is something else.
     """
+    if not isinstance(equilibrium, kind):
+        instance("equilibrium", equilibrium, kind, "step from rest() of this solver")
     if equilibrium.robot is not robot and equilibrium.robot != robot:
         raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
     if equilibrium.scene is not scene and equilibrium.scene != scene:

@@ -20,7 +20,7 @@ class Status(IntEnum):
     Where a release ends in a snap to more tension than the motor holds, it yields: the cable goes farther than asked.
     """
     BLOCKED = 3
-    """Geometry blocks the robot below its tension limit: to first order, no motion meets the command and every obstacle.
+    """Geometry blocks the robot below its tension limit: to first order, no motion meets the command and all obstacles.
 
     The tension grows without bound on the way to such a place, so that a finite limit stalls the robot first.
     """

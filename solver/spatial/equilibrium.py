@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -14,13 +15,15 @@ from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SpatialEquilibrium(BaseEquilibrium):
     """One equilibrium of a robot among obstacles in space; a step starts from it and needs nothing else.
 
     Frame: base at the origin, unactuated backbone along +z, first cable on the +x side. The lines of points that can
     touch are those of ``robot.lines_mm``. The attributes are those of :class:`solver.equilibrium.BaseEquilibrium`.
     """
+
+    robot_kind: ClassVar[type] = SpatialRobot
 
     robot: SpatialRobot
 

@@ -15,12 +15,14 @@ import numpy as np
 
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import sides
+from solver.validation import finite, instance
 
 TINY = 1e-300  # keeps quotients defined where nothing pushes
 
 
 def force_true(equilibrium: SpatialEquilibrium) -> np.ndarray:
     """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 3)`` [N]."""
+    instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
     return equilibrium.forces.copy()
 
 
@@ -62,12 +64,23 @@ class SpatialVirtualWork:
 
     Attributes:
         friction: Ratio μ of tangential to normal force.
+
+    Raises:
+        ValueError: If the ratio is not finite.
     """
 
     friction: float = 0.0
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "friction", finite("friction", self.friction))
+
     def estimate(self, equilibrium: SpatialEquilibrium) -> np.ndarray:
-        """Estimated contact force, ``(m, 3)`` [N]."""
+        """Estimated contact force, ``(m, 3)`` [N].
+
+        Raises:
+            TypeError: If ``equilibrium`` is something else.
+        """
+        instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
         slopes = equilibrium.tip_slopes
         forces = with_friction(equilibrium.forces, slopes[:, :3], self.friction)
         loads = sides(equilibrium.cables_mm) * equilibrium.tensions - equilibrium.onset_tensions

@@ -1,16 +1,17 @@
 """Obstacles of space, validated once."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from solver.formulation import GapLaw
-from solver.obstacles import Extent, Obstacle, Place, direction, place
-from solver.robot import require_positive
+from solver.obstacles import Extent, Obstacle
 from solver.spatial.formulation import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
+from solver.validation import SMALLEST, Point, direction, point, positive
+
+PARALLEL = 1e-6  # sine of the least angle between the axes of a box
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,17 +19,6 @@ class SpatialObstacle(Obstacle):
     """A convex obstacle of space, fixed or on a spring; the attributes are those of :class:`solver.Obstacle`."""
 
     space: ClassVar[int] = 3
-    places: ClassVar[tuple[str, ...]] = ("center",)  # fields that move with it
-
-    def __post_init__(self) -> None:
-        Obstacle.__post_init__(self)
-        for name in self.places:
-            object.__setattr__(self, name, place(name, getattr(self, name), 3))
-
-    def shifted(self, by: Iterable[float]) -> Self:
-        """The obstacle elsewhere."""
-        shift = np.array(list(by))
-        return replace(self, **{name: tuple((getattr(self, name) + shift).tolist()) for name in self.places})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,12 +35,8 @@ class Sphere(SpatialObstacle):
 
     law: ClassVar[GapLaw] = SPHERE
 
-    center: Place
+    center: Point
     radius: float
-
-    def __post_init__(self) -> None:
-        SpatialObstacle.__post_init__(self)
-        require_positive("radius", self.radius)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -81,12 +67,13 @@ class HalfSpace(SpatialObstacle):
 
     law: ClassVar[GapLaw] = HALF_SPACE
     places: ClassVar[tuple[str, ...]] = ("point",)
+    lengths: ClassVar[tuple[str, ...]] = ()
 
-    point: Place
-    normal: Place
+    point: Point
+    normal: Point
 
     def __post_init__(self) -> None:
-        SpatialObstacle.__post_init__(self)
+        Obstacle.__post_init__(self)
         object.__setattr__(self, "normal", direction("normal", self.normal, "from the wall towards the robot", 3))
 
     @property
@@ -122,13 +109,12 @@ class Capsule(SpatialObstacle):
     law: ClassVar[GapLaw] = CAPSULE
     places: ClassVar[tuple[str, ...]] = ("start", "end")
 
-    start: Place
-    end: Place
+    start: Point
+    end: Point
     radius: float
 
     def __post_init__(self) -> None:
-        SpatialObstacle.__post_init__(self)
-        require_positive("radius", self.radius)
+        Obstacle.__post_init__(self)
         _check_ends(self.start, self.end)
 
     @property
@@ -166,16 +152,15 @@ class Cylinder(SpatialObstacle):
 
     law: ClassVar[GapLaw] = CYLINDER
     places: ClassVar[tuple[str, ...]] = ("start", "end")
+    lengths: ClassVar[tuple[str, ...]] = ("radius", "edge")
 
-    start: Place
-    end: Place
+    start: Point
+    end: Point
     radius: float
     edge: float = 1.0
 
     def __post_init__(self) -> None:
-        SpatialObstacle.__post_init__(self)
-        require_positive("radius", self.radius)
-        require_positive("edge", self.edge)
+        Obstacle.__post_init__(self)
         _check_ends(self.start, self.end)
         largest = min(self.radius, _middle(self.start, self.end)[1])
         if self.edge > largest:
@@ -220,27 +205,34 @@ class Box(SpatialObstacle):
     """
 
     law: ClassVar[GapLaw] = BOX
+    lengths: ClassVar[tuple[str, ...]] = ("edge",)
 
-    center: Place
-    sizes: Place
+    center: Point
+    sizes: Point
     edge: float = 1.0
-    axis: Place = (1.0, 0.0, 0.0)
-    second: Place = (0.0, 1.0, 0.0)
+    axis: Point = (1.0, 0.0, 0.0)
+    second: Point = (0.0, 1.0, 0.0)
 
     def __post_init__(self) -> None:
-        SpatialObstacle.__post_init__(self)
-        object.__setattr__(self, "sizes", place("sizes", self.sizes, 3))
-        for size in (*self.sizes, self.edge):
-            require_positive("a size or the edge", size)
+        Obstacle.__post_init__(self)
+        object.__setattr__(self, "sizes", point("sizes", self.sizes, 3))
+        for size in self.sizes:
+            positive("a size", size)
         if self.edge > min(self.sizes) / 2:
             raise ValueError(
                 f"edge is {self.edge}; it must be at most {min(self.sizes) / 2:.6g}, half the smallest size"
             )
         object.__setattr__(self, "axis", direction("axis", self.axis, "of the first axis", 3))
-        across = np.subtract(self.second, np.dot(self.second, self.axis) * np.array(self.axis))
+        second = point("second", self.second, 3)
+        across = np.subtract(second, np.dot(second, self.axis) * np.array(self.axis))
+        if not np.linalg.norm(across) > PARALLEL * math.hypot(*second):
+            raise ValueError(f"second is {second}; give the direction of the second axis, not of the first")
         object.__setattr__(
             self, "second", direction("second", across.tolist(), "of the second axis, not of the first", 3)
         )
+
+    def _radii(self) -> list[tuple[str, float]]:
+        return [("edge", self.edge), *(("a size", size) for size in self.sizes)]
 
     @property
     def axes(self) -> np.ndarray:
@@ -266,12 +258,12 @@ class Box(SpatialObstacle):
         return np.asarray(self.center + corners @ self.axes)
 
 
-def _check_ends(start: Place, end: Place) -> None:
-    if start == end:
+def _check_ends(start: Point, end: Point) -> None:
+    if math.dist(start, end) < SMALLEST:
         raise ValueError(f"start and end are both {start}; they must differ")
 
 
-def _middle(start: Place, end: Place) -> tuple[Place, float]:
+def _middle(start: Point, end: Point) -> tuple[Point, float]:
     """Middle of a line, and half its length."""
     return tuple((np.add(start, end) / 2).tolist()), math.dist(start, end) / 2
 

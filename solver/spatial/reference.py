@@ -7,13 +7,14 @@ import casadi as ca
 import numpy as np
 
 from solver.geometry import touchable_points
+from solver.layout import SPACE
 from solver.reference import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
 from solver.scene import Scene
-from solver.solve import check_clear, check_core
+from solver.solve import check_clear, check_core, check_scene
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
-from solver.spatial.solve import check_cables, check_space
+from solver.spatial.solve import check_cables
 from solver.status import Status
 
 
@@ -32,8 +33,8 @@ class SpatialReferenceSolver:
     """
 
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
+        check_scene(robot, SpatialRobot, scene, SPACE)
         self.robot, self.scene = robot, scene
-        check_space(scene)
         check_core(robot, scene)
         self._touchable = touchable_points(robot, scene)
         problem = spatial_problem(robot, scene.laws, scene.mounted)
@@ -50,7 +51,7 @@ class SpatialReferenceSolver:
         slopes = ca.gradient(problem.objective + ca.dot(multipliers, constraints), problem.parameters)[:2]
         self._cable_slopes = ca.Function("slopes", [problem.unknowns, problem.parameters, multipliers], [slopes])
         self._rest = self._free(np.zeros(2))
-        check_clear(self._rest)
+        check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> SpatialEquilibrium:
         """The straight, unactuated robot."""

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.robot import check_numbers, require_positive
+from solver.robot import check_cable, check_numbers, check_points, check_scale
+from solver.validation import finite, whole
 
 LINES = ("backbone", "holes", "rim")
+LEAST_SINE = math.sin(math.radians(30) - 1e-9)  # of the angle between the cables
 
 
 def sides(cables_mm: np.ndarray) -> np.ndarray:
@@ -27,7 +29,7 @@ class SpatialRobot:
         length_mm: Length of the backbone, L0 [mm].
         segments: Number of segments n; nodes are 0 (clamped) to n.
         offset_mm: Distance a of the cables from the backbone [mm].
-        angle: From the first cable to the second, about +z [rad]; neither 0 nor half a turn.
+        angle: From the first cable to the second, about +z [rad]; 30° to 150° either way.
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tensions, never the shape.
         max_tension: Tension the motor of a cable can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest displacement of a cable [mm]; ``None`` stands for π·a / 2, a quarter turn of the tip.
@@ -53,13 +55,16 @@ class SpatialRobot:
 
     def __post_init__(self) -> None:
         check_numbers(self, LINES)
-        if not (math.isfinite(self.angle) and abs(math.sin(self.angle)) > 0.1):
-            raise ValueError(f"angle is {self.angle}; the cables must not be near one plane with the backbone")
-        if not (isinstance(self.rim_points, int) and 3 <= self.rim_points <= 64):
-            raise ValueError(f"rim_points is {self.rim_points!r}; it must be a whole number from 3 to 64")
-        if self.max_cable_mm is None:
-            object.__setattr__(self, "max_cable_mm", min(math.pi * self.offset_mm, self.length_mm) / 2)
-        require_positive("max_cable_mm", self.max_cable_mm)
+        object.__setattr__(self, "angle", finite("angle", self.angle))
+        if abs(math.sin(self.angle)) < LEAST_SINE:
+            raise ValueError(
+                f"angle is {self.angle}; it must be from π/6 to 5π/6 either way: cables nearer to one plane with the "
+                "backbone pull against each other, and an obstacle that turns the robot aside drives up their tension"
+            )
+        object.__setattr__(self, "rim_points", whole("rim_points", self.rim_points, 3, 64))
+        check_scale(self, self.length_mm)
+        check_points(self, self.lines * self.positions)
+        check_cable(self, min(math.pi * self.offset_mm, self.length_mm) / 2)
         bound = min(self.length_mm, self.segments * self.offset_mm * abs(math.sin(self.angle)))
         if not self.cable_limit_mm < bound:
             raise ValueError(f"max_cable_mm is {self.max_cable_mm}; it must be below {bound:.6g}")
@@ -108,6 +113,16 @@ class SpatialRobot:
     def positions(self) -> int:
         """Number of points of a line that can touch, node 0 included."""
         return self.segments * (self.between + 1) + 1
+
+    @property
+    def shortest_mm(self) -> float:
+        """Shortest length of the backbone, which is fixed [mm]."""
+        return self.length_mm
+
+    @property
+    def longest_mm(self) -> float:
+        """Longest length of the backbone, which is fixed [mm]."""
+        return self.length_mm
 
     @property
     def segment_mm(self) -> float:

@@ -7,10 +7,12 @@ import casadi as ca
 import numpy as np
 
 from solver.formulation import GapLaw, second_derivatives
+from solver.scene import MAX_OBSTACLES
 from solver.sensitivity import respond
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
+from solver.validation import instance, whole
 
 CABLES, LENGTH = slice(0, 2), 2  # rows of a SpatialSensitivity
 MOTIONS = 7  # of an obstacle
@@ -43,7 +45,12 @@ class SpatialSensitivity:
 
 
 def obstacle_rows(obstacle: int) -> slice:
-    """Rows of a :class:`SpatialSensitivity` that belong to an obstacle: three shifts, three turns, radius."""
+    """Rows of a :class:`SpatialSensitivity` that belong to an obstacle: three shifts, three turns, radius.
+
+    Raises:
+        ValueError: If it is not the index of an obstacle.
+    """
+    obstacle = whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
     return slice(3 + MOTIONS * obstacle, 3 + MOTIONS * (obstacle + 1))
 
 
@@ -55,8 +62,11 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
         active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier.
 
     Raises:
-        ValueError: If no cable is pulled, or ``active`` has the wrong shape.
+        ValueError: If no cable is pulled, or ``active`` has the wrong shape, or contacts that cannot all be closed at
+            once.
+        TypeError: If ``equilibrium`` is something else.
     """
+    instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
     robot, scene = equilibrium.robot, equilibrium.scene
     if not equilibrium.cables_mm.any():
         raise ValueError("cables_mm is (0, 0); one must be pulled, for the shear to be determined")

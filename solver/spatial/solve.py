@@ -9,10 +9,11 @@ from solver.batch import BaseBatch
 from solver.equilibrium import Optimality
 from solver.layout import SPACE, Layout, Model
 from solver.scene import Scene
-from solver.solve import Trace, check_clear, check_core, check_origin, read_trace, scene_arrays
-from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout
+from solver.solve import Trace, check_clear, check_core, check_origin, check_scene, read_trace, scene_arrays
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.robot import SpatialRobot
 from solver.status import Status
+from solver.validation import number, sequence, shown
 
 
 class SpatialSolver:
@@ -27,18 +28,19 @@ class SpatialSolver:
 
     Raises:
         ValueError: If an obstacle is one of the plane, overlaps the straight robot, is narrow enough to slip between
-            its points, or names a node the robot does not have.
+            its points, names a node the robot does not have, or is out of all proportion to it.
+        TypeError: If the robot or the scene is something else.
     """
 
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
+        check_scene(robot, SpatialRobot, scene, SPACE)
         self.robot, self.scene = robot, scene
-        check_space(scene)
         check_core(robot, scene)
         self._kernel = _kernel.SpatialKernel(kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
         straight[spatial_layout(robot, len(scene)).length_at] = robot.length_mm
         self._rest = self._follow(straight, np.zeros(2))
-        check_clear(self._rest)
+        check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> SpatialEquilibrium:
         """The straight, unactuated robot."""
@@ -60,8 +62,10 @@ class SpatialSolver:
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is something else.
         """
-        return self._follow(equilibrium.block, check_cables(self.robot, self.scene, equilibrium, cables_mm))
+        cables = check_cables(self.robot, self.scene, equilibrium, cables_mm)
+        return self._follow(equilibrium.block, cables)
 
     def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> Trace:
         """Every shape accepted on the way of :meth:`step`, from the present one on.
@@ -85,14 +89,20 @@ class SpatialSolver:
     def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
         reached = np.empty_like(block)
         first, second = cables.tolist()
-        status, *work = self._kernel.step(block, first, second, self.robot.length_mm, reached)
-        return SpatialEquilibrium(self.robot, self.scene, reached, Status(status), *work)
+        work = self._kernel.step(block, first, second, self.robot.length_mm, reached)
+        return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
 
 
 class SpatialBatchSolver(BaseBatch):
     """Many robots in space, each moved as :class:`SpatialSolver` would; see :class:`solver.batch.BaseBatch`."""
 
     model: ClassVar[Model] = SPACE
+    robot_kind: ClassVar[type] = SpatialRobot
+
+    def _straight_points(self) -> np.ndarray:
+        nodes = np.zeros((self.robot.segments + 1, 3))
+        nodes[:, 2] = np.linspace(0.0, self.robot.length_mm, len(nodes))
+        return touching_points(self.robot, nodes, np.tile(np.eye(3), (len(nodes), 1, 1)))
 
     def _make_layout(self, obstacles: int) -> Layout:
         return spatial_layout(self.robot, obstacles)
@@ -129,21 +139,9 @@ def kernel_scene(robot: SpatialRobot, scene: Scene) -> _kernel.SpatialScene:
     """Obstacles as the kernel takes them.
 
     Raises:
-        ValueError: If an obstacle is one of the plane or names a node that the robot does not have.
+        ValueError: If an obstacle names a node that the robot does not have.
     """
-    check_space(scene)
     return _kernel.SpatialScene(*scene_arrays(robot, scene))
-
-
-def check_space(scene: Scene) -> None:
-    """Refuse obstacles of the plane.
-
-    Raises:
-        ValueError: Naming one.
-    """
-    for obstacle in scene:
-        if obstacle.space != SPACE.space:
-            raise ValueError(f"{obstacle!r} is an obstacle of the plane; give one of solver.spatial")
 
 
 def check_cables(
@@ -153,9 +151,15 @@ def check_cables(
 
     Raises:
         ValueError: Naming the value and the bound.
+        TypeError: If the equilibrium is something else.
     """
-    cables, limit = np.array(cables_mm, dtype=float), robot.cable_limit_mm
-    if not (cables.shape == (2,) and np.all(np.abs(cables) <= limit)):
-        raise ValueError(f"cables_mm is {cables_mm}; both must be within ±{limit:.6g} (robot.max_cable_mm)")
-    check_origin(robot, scene, equilibrium)
-    return cables
+    limit = robot.cable_limit_mm
+    bound = f"a pair, both within ±{limit:.6g} (robot.max_cable_mm)"
+    cables = [
+        number("an entry of cables_mm", cable, -limit, limit, bound)
+        for cable in sequence("cables_mm", cables_mm, bound)
+    ]
+    if len(cables) != 2:
+        raise ValueError(f"cables_mm is {shown(cables_mm)}; it must be {bound}")
+    check_origin(robot, scene, equilibrium, SpatialEquilibrium)
+    return np.array(cables)

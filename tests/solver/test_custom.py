@@ -1,9 +1,11 @@
 """Shapes given as expressions: a custom ellipse is the ellipse, and a new shape is as exact as any."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -119,7 +121,7 @@ def test_families_of_one_expression_share_a_library():
     ("change", "message"),
     [
         ({"sizes": (6,)}, r"sizes is \(6.0,\); its family takes 2 numbers"),
-        ({"reach": 8}, "reach is 8; the shape does not end within it"),
+        ({"reach": 8}, "reach is 8.0; the shape does not end within it"),
         ({"reach": -1}, "reach is -1; it must be positive"),
         ({"sizes": (6, 0)}, "is not negative at its centre"),
         ({"axis": (0, 0)}, r"axis is \(0, 0\)"),
@@ -129,3 +131,69 @@ def test_families_of_one_expression_share_a_library():
 def test_bad_shapes_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         egg(**change)
+
+
+def disc(point):
+    return ca.norm_2(point) - 12
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (
+            lambda point, _: ca.floor(disc(point)) + 0.5,
+            "is not finite at the point .* of the shape's outline",
+        ),
+        (lambda point, _: ca.if_else(disc(point) < 0, -1, 1), "the gap or its slope is not finite at the point"),
+        (lambda point, _: ca.sign(disc(point)), "the gap or its slope is not finite at the point"),
+        (lambda point, _: disc(point) ** 3, "at the point .* give a function that is smooth there"),
+        (lambda point, _: disc(point) * 1e-200, "the gap or its slope is not finite at the point"),
+        (lambda point, _: disc(point) + 3 * ca.sign(disc(point)), "the function jumps at the point"),
+        (
+            lambda point, _: disc(point) * (1 + 0.5 * ca.sin(1e8 * disc(point))),
+            "at the point .* of the shape's outline",
+        ),
+        (
+            lambda point, _: ca.fmin(ca.norm_2(point) - 5, ca.norm_2(point - ca.DM([12, 0])) - 5),
+            "the ray from the centre meets the outline more than once at the point .*; move the centre",
+        ),
+    ],
+)
+def test_functions_that_give_no_distance_are_refused(function, message):
+    with pytest.raises(ValueError, match=message):
+        Custom(family=Family.trace(function), center=(44, 104), axis=(1, 2), reach=20)
+
+
+def test_the_point_named_is_on_the_outline():
+    bent = Family.trace(lambda point, _: ca.if_else(point[0] > 0, 1, disc(point) ** 2) * disc(point))
+    with pytest.raises(ValueError, match="at the point") as refusal:
+        Custom(family=bent, center=(44, 104), axis=(1, 2), reach=20)
+    x, y = map(float, re.search(r"\((\S+), (\S+)\)", str(refusal.value)).groups())
+    assert np.hypot(x - 44, y - 104) == pytest.approx(12, abs=1e-4)
+
+
+@pytest.mark.parametrize("sharpness", [2, 4, 8, 16])
+def test_smooth_shapes_are_taken_however_they_are_scaled(sharpness):
+    for scale in (1e-12, 1.0, 1e12):
+        power = Family.trace(lambda point, sizes, scale=scale: scale * (ca.sum1((point / sizes) ** sharpness) - 1), 2)
+        shape = Custom(family=power, sizes=(15, 9), center=(44, 104), axis=(1, 2), reach=20)
+        assert np.abs(shape.gap(shape.outline())).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: egg(family=None), TypeError, "family is None; it must be a Family: trace a function"),
+        (lambda: egg(sizes=("6", 12)), ValueError, "a number of sizes is '6'; it must be finite"),
+        (lambda: egg(sizes=6), ValueError, "sizes is 6; it must be a tuple of numbers"),
+        (lambda: egg(reach=True), ValueError, "reach is True; it must be positive"),
+        (lambda: Family.trace(None), TypeError, "function is None; give a function"),
+        (lambda: Family.trace(lambda point, _: point), ValueError, "it must return one CasADi expression"),
+        (lambda: Family.trace(lambda point, _: 3.0), ValueError, "function returned 3.0; it must return one CasADi"),
+        (lambda: Family.trace(lambda point, _: point[0], -1), ValueError, "sizes is -1; it must be a whole number"),
+        (lambda: Family.trace(lambda point, sizes: sizes[1], 1), ValueError, "function is not one of CasADi symbols"),
+    ],
+)
+def test_bad_families_are_refused(call, error, message):
+    with pytest.raises(error, match=message):
+        call()

@@ -82,8 +82,8 @@ def test_let_go_the_obstacle_returns_to_its_place():
 @pytest.mark.parametrize(
     ("stiffness", "message"),
     [
-        (0.0, "stiffness is 0.0; it must be finite, symmetric and positive definite"),
-        (np.inf, "stiffness is inf; it must be finite, symmetric and positive definite"),
+        (0.0, "stiffness is 0.0; it must be positive and finite"),
+        (np.inf, "stiffness is inf; it must be positive and finite"),
         (((1, 0.5), (0.4, 1)), "it must be finite, symmetric and positive definite"),
         (((1, 2), (2, 1)), "it must be finite, symmetric and positive definite"),
         ((1, 2, 3), "it must be a number or a matrix"),
