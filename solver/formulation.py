@@ -330,6 +330,7 @@ def limits(robot: "Robot") -> int:
 def _disk_gaps(robot: "Robot", backbone: ca.MX, disk: ca.MX, ahead: ca.MX) -> list[ca.MX]:
     """What is left between consecutive disks at their edges, across their bisector, on each side [mm]."""
     radius, thickness = robot.disk_radius_mm, robot.disk_thickness_mm
+    assert radius is not None
     half_cosine = norms(disk[:, :-1] + disk[:, 1:]) / (2 * robot.offset_mm)
     gaps = []
     for side in (1, -1):

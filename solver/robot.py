@@ -79,12 +79,13 @@ class Robot:
     def _check_disks(self) -> None:
         radius = self.offset_mm if self.disk_radius_mm is None else self.disk_radius_mm
         low, high = (ratio * self.longest_mm for ratio in OFFSETS)
-        object.__setattr__(self, "disk_radius_mm", number("disk_radius_mm", radius, low, high))
+        bound = f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length"
+        radius = number("disk_radius_mm", radius, low, high, bound)
         most = THICKEST * self.shortest_mm / self.segments
         bound = f"from 0 to {most:.6g}, {THICKEST} of a segment's length"
-        object.__setattr__(
-            self, "disk_thickness_mm", number("disk_thickness_mm", self.disk_thickness_mm, 0.0, most, bound)
-        )
+        thickness = number("disk_thickness_mm", self.disk_thickness_mm, 0.0, most, bound)
+        object.__setattr__(self, "disk_radius_mm", radius)
+        object.__setattr__(self, "disk_thickness_mm", thickness)
 
     def _check_lengths(self) -> None:
         if self.length_range_mm is None:

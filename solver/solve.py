@@ -39,9 +39,8 @@ def read_trace(numbers: list[float], robot: AnyRobot, scene: Scene, space: int) 
     parts = ((robot.segments + 1, 3), (len(robot.lines_mm), robot.positions, space), (len(scene), space))
     ends = np.cumsum([math.prod(part) for part in parts])
     rows = np.reshape(numbers, (-1, int(ends[-1])))
-    return Trace(
-        *(columns.reshape(-1, *part) for columns, part in zip(np.split(rows, ends[:-1], 1), parts, strict=True))
-    )
+    columns = np.split(rows, ends[:-1], axis=1)
+    return Trace(*(column.reshape(-1, *part) for column, part in zip(columns, parts, strict=True)))
 
 
 class Solver:
@@ -114,14 +113,13 @@ class Solver:
         Raises:
             ValueError: If the equilibrium is another robot's or scene's.
         """
-        check_origin(self.robot, self.scene, equilibrium)
+        check_origin(self.robot, self.scene, equilibrium, Equilibrium)
         return Optimality(*self._kernel.optimality(equilibrium.block))
 
     def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
-        return Equilibrium.solved(
-            self.robot, self.scene, reached, *self._kernel.step(block, cable_mm, length_mm, reached)
-        )
+        work = self._kernel.step(block, cable_mm, length_mm, reached)
+        return Equilibrium.solved(self.robot, self.scene, reached, *work)
 
 
 def kernel_robot(robot: Robot) -> _kernel.Robot:
@@ -166,9 +164,7 @@ def scene_arrays(robot: AnyRobot, scene: Scene) -> SceneArrays:
     return (
         [SHAPES[obstacle.kind] for obstacle in scene],
         np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
-        np.array(
-            [(*extent.center, extent.radius, extent.fineness, extent.inradius) for extent in extents], dtype=float
-        ),
+        np.array([(*e.center, e.radius, e.fineness, e.inradius) for e in extents], dtype=float),
         touchable_points(robot, scene).reshape(len(scene), len(robot.lines_mm) * robot.positions),
         np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
         [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
@@ -188,8 +184,8 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
         if (touchable[1:] & touchable[:-1]).any() and not 2 * inradius > longest:
             between = math.floor(longest * (robot.between + 1) / (2 * inradius))
             raise ValueError(
-                f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.3g} mm; it could slip between "
-                f"points of the robot, up to {longest:.3g} mm apart: give the robot between={between} or more"
+                f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.3g} mm; it could slip "
+                f"between points of the robot, up to {longest:.3g} mm apart: give the robot between={between} or more"
             )
 
 

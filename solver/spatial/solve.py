@@ -83,7 +83,7 @@ class SpatialSolver:
         Raises:
             ValueError: If the equilibrium is another robot's or scene's.
         """
-        check_origin(self.robot, self.scene, equilibrium)
+        check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
         return Optimality(*self._kernel.optimality(equilibrium.block))
 
     def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
