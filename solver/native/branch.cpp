@@ -548,7 +548,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
       farthest = std::max(farthest, norm(minus(points_[k], start_points[k])));
     return farthest > kStill * newton_.chain.robot().max_length ? End::kSnapped : End::kPassed;
   }
-  return undo(End::kBlocked);
+  return undo(End::kStuck);
 }
 
 template <class Model>
@@ -588,34 +588,90 @@ bool Branch<Model>::hold(Command& wanted) const {
   return give_up(newton_.chain.robot().max_tension * (1 - kTensionBand)) || give_up(-HUGE_VAL);
 }
 
-// Lets out the cables whose motors cannot hold them.
+// Lets out, by at least so much, the cables whose motors cannot hold them; false where they go farther by themselves.
 template <class Model>
-void Branch<Model>::yield(Command& wanted) const {
+bool Branch<Model>::yield(Command& wanted, double least) const {
+  bool changed = false;
   for (int k = 0; k < kCables; ++k) {
     const double present = present_.command.cables[k];
-    if (tensions_[k] > newton_.chain.robot().max_tension)
-      wanted.cables[k] = std::copysign(std::max(std::abs(present) - kYield * newton_.chain.robot().offset, 0.0), present);
+    const double held = std::max(std::abs(present) - least * newton_.chain.robot().offset, 0.0);
+    if (tensions_[k] <= newton_.chain.robot().max_tension || present == 0 || wanted.cables[k] / present <= held / std::abs(present))
+      continue;
+    wanted.cables[k] = std::copysign(held, present);
+    changed = true;
   }
+  return changed;
+}
+
+// Whether to first order no motion of the robot meets the command: the multipliers that hold it, or that of the gap it
+// would run into, balance each other without the energy of the robot, as they do where the tension grows beyond bounds.
+template <class Model>
+bool Branch<Model>::barred(const Command& command) {
+  Chain& chain = newton_.chain;
+  ActiveSet holding = present_.active;
+  if (holding.count == 0) {
+    trial_ = present_;
+    trial_.command = command;
+    if (!chain.evaluate(trial_)) return false;
+    for (const int contact : chain.near())
+      if (chain.gaps()[contact] < (holding.count == 0 ? 0.0 : chain.gaps()[holding.contact[0]])) {
+        holding.count = 1;
+        holding.contact[0] = contact;
+        holding.multiplier[0] = 1;
+      }
+  }
+  settled_ = false;
+  if (holding.count == 0 || !chain.evaluate(present_)) return false;
+  double pressed = 0, balance = 0;
+  for (int j = 0; j < holding.count; ++j)
+    pressed = std::max(pressed, holding.multiplier[j] * chain.lever_arm(holding.contact[j]));
+  chain.reduced_gradient({});
+  std::vector<typename Model::Control> slope = chain.gradient();
+  chain.reduced_gradient(holding);
+  for (std::size_t i = 0; i < slope.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k) balance = std::max(balance, std::abs(chain.gradient()[i][k] - slope[i][k]));
+  for (std::size_t m = 0; m < present_.mounts.size(); ++m) {
+    Position pushed{};
+    for (int j = 0; j < holding.count; ++j)
+      if (chain.mount(holding.contact[j]) == static_cast<int>(m)) {
+        const auto normal = chain.slope(holding.contact[j]).normal;
+        for (int k = 0; k < kSpace; ++k) pushed[k] += holding.multiplier[j] * normal[k];
+      }
+    balance = std::max(balance, chain.robot().max_length / chain.robot().segments * norm(pushed));
+  }
+  return balance <= kBarred * pressed;
+}
+
+// As tensions grow beyond all that a robot needs to bend, its geometry begins to bar it, ever more closely.
+template <class Model>
+double Branch<Model>::smallest_step() const {
+  const Robot& robot = newton_.chain.robot();
+  const double natural = robot.rigidity / (robot.offset * robot.max_length);
+  return highest(tensions_) > kTight * natural ? kCommandResolution : kSmallestStep;
 }
 
 template <class Model>
 Status Branch<Model>::follow(const Command& target) {
   Status reached = Status::kConverged;
   Command wanted = target;
-  double step = kLargestStep;
+  double step = kLargestStep, yielding = kYield;
   bool refined = false;  // the last attempt was rejected: do not grow again at once
+  const double limit = newton_.chain.robot().max_tension;
   const int steps = kSubSteps + static_cast<int>(2 * apart(present_.command, target) / kLargestStep);
   for (int sub = 0, ends = 0; sub < steps && ends < kBranchEnds && !spent(); ++sub) {
+    // A release may lead to more tension than a motor holds: it yields until it holds again.
+    if (highest(tensions_) > limit) {
+      if (yield(wanted, yielding)) {
+        reached = std::max(reached, Status::kStalled);
+        forget();
+        yielding *= 2;
+      }
+    } else {
+      yielding = kYield;
+    }
     const Command goal = this->goal(wanted);
     const double remaining = apart(present_.command, goal);
-    if (remaining == 0) {
-      // A release may end in a snap to more tension than the motor holds: it yields until it holds again.
-      if (highest(tensions_) <= newton_.chain.robot().max_tension || pull(present_.command.cables) == 0) return reached;
-      yield(wanted);
-      forget();
-      reached = std::max(reached, Status::kStalled);
-      continue;
-    }
+    if (remaining == 0) return reached;
     bool stalled = kCables == 1 && at_limit() && pulls(goal) && goal.length == present_.command.length;
     const double size = std::min(step, remaining);
     const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
@@ -627,12 +683,12 @@ Status Branch<Model>::follow(const Command& target) {
     } else if (move == Move::kOverTension) {
       stalled = stalled || approach_limit();
       step = size / 2;
-    } else if (size > kSmallestStep) {
+    } else if (size > smallest_step()) {
       step = size / 2;
       refined = true;
     } else {
       const End end = pass_end(next);
-      if (end == End::kBlocked) return Status::kBlocked;
+      if (end == End::kStuck) return barred(next) ? Status::kBlocked : Status::kGaveUp;
       stalled = end == End::kOverTension;
       if (end == End::kSnapped) reached = std::max(reached, Status::kSnapped);
       step = 2 * kSmallestStep;
@@ -640,7 +696,7 @@ Status Branch<Model>::follow(const Command& target) {
       ++ends;
     }
     if (stalled) {
-      reached = Status::kStalled;
+      reached = std::max(reached, Status::kStalled);
       if (!hold(wanted)) return reached;
       forget();
     }

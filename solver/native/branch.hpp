@@ -99,7 +99,7 @@ class Branch : public Follower<Model::kSpace> {
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension };
-  enum class End { kPassed, kSnapped, kBlocked, kOverTension };
+  enum class End { kPassed, kSnapped, kStuck, kOverTension };
 
   void load(const double* block);
   void store(double* block);
@@ -107,7 +107,9 @@ class Branch : public Follower<Model::kSpace> {
   Status follow(const Command& target);
   Command goal(Command wanted) const;
   bool hold(Command& wanted) const;
-  void yield(Command& wanted) const;
+  bool yield(Command& wanted, double least) const;
+  bool barred(const Command& command);
+  double smallest_step() const;
   double apart(const Command& a, const Command& b) const;
   double travelled(const Command& from, const Command& to) const;
   bool spent() const { return newton_.work() - work_before_ > limits::kWork; }

@@ -270,9 +270,12 @@ double Chain<Model>::violation() const {
 }
 
 template <class Model>
-double Chain<Model>::tolerance() const {
+double Chain<Model>::tolerance(const ActiveSet& active) const {
   const double scale = Model::kSliding ? model_.steepest : model_.free_turn() * model_.free_turn();
-  return limits::kStationarity * scale + limits::kRoundoff * model_.steepest;
+  double pressed = model_.steepest;  // also by contacts
+  for (int j = 0; j < active.count; ++j)
+    pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));
+  return limits::kStationarity * scale + limits::kRoundoff * pressed;
 }
 
 template <class Model>

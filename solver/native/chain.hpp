@@ -110,7 +110,7 @@ class Chain {
   double energy() const { return energy_; }  // the objective and that of the springs, over the stiffness [rad^2]
   double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the stiffness [rad^2]
   double violation() const;  // largest -gap, at least 0
-  double tolerance() const;  // of the slope of the Lagrangian
+  double tolerance(const ActiveSet& active) const;  // of the slope of the Lagrangian
   double stiffness() const { return robot_.stiffness(model_.segment_length() * robot_.segments); }
   const std::vector<State>& states() const { return model_.states; }
   const std::vector<Frame>& frames() const { return model_.frames; }

@@ -39,7 +39,7 @@ bool Newton<Model>::equilibrium(const ActiveSet& active) const {
     for (const double slope : g.v) worst = std::max(worst, std::abs(slope));
   const double arm = chain.robot().max_length / chain.robot().segments;
   for (const auto& g : chain.mount_gradient()) worst = std::max(worst, arm * norm(g));
-  return worst <= chain.tolerance() && on_surface(active, kFeasibility);
+  return worst <= chain.tolerance(active) && on_surface(active, kFeasibility);
 }
 
 // Exact curvature where it is positive; else a penalty on the active gaps, which leaves the solution where it is.
