@@ -1,9 +1,10 @@
 """Obstacles of any smooth shape, given as a CasADi expression."""
 
+import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Self
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,16 @@ from solver.formulation import GapLaw, gap_function
 from solver.obstacles import Extent, Obstacle, Pair, directions, pair, plus, unit
 from solver.robot import require_positive
 
+UNARY = (
+    *("NEG", "EXP", "LOG", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "NOT", "FLOOR", "CEIL"),
+    *("FABS", "SIGN", "ERF", "INV", "SINH", "COSH", "TANH", "ASINH", "ACOSH", "ATANH", "ERFINV", "LOG1P", "EXPM1"),
+)
+BINARY = (
+    *("ADD", "SUB", "MUL", "DIV", "POW", "CONSTPOW", "LT", "LE", "EQ", "NE", "AND", "OR", "FMOD", "COPYSIGN"),
+    *("IF_ELSE_ZERO", "FMIN", "FMAX", "ATAN2", "HYPOT", "REMAINDER"),
+)
+OPERATIONS = {name: getattr(ca, f"OP_{name}") for name in (*UNARY, *BINARY, "CONST", "INPUT", "OUTPUT")}
+NAMES = {operation: name for name, operation in OPERATIONS.items()}
 PLACE_SIZE = 5  # numbers of a shape before its sizes: centre, axis, growth
 BISECTIONS = 60
 
@@ -21,11 +32,20 @@ BISECTIONS = 60
 class Family:
     """Shapes ``F(point, sizes) < 0``, traced once; families of the same expression are equal.
 
+    The text lists elementary operations and nothing else, unlike CasADi's own serialisation, which loads the libraries
+    it names: a family that comes from elsewhere cannot run code.
+
     Attributes:
-        text: The function as CasADi writes it.
+        text: The number of sizes and the operations, as :meth:`trace` writes them.
+
+    Raises:
+        ValueError: If the text is something else.
     """
 
     text: str
+
+    def __post_init__(self) -> None:
+        _rebuilt(self.text)
 
     @classmethod
     def trace(cls, function: Callable[[ca.SX, ca.SX], ca.SX], sizes: int = 0) -> Self:
@@ -35,14 +55,21 @@ class Family:
             function: ``(point, sizes) → F``, smooth, negative inside and positive outside, its slope not zero on the
                 surface; the point (2) is counted from the centre of the shape [mm].
             sizes: How many numbers tell a shape of the family from the others.
+
+        Raises:
+            ValueError: If there are too many sizes, or the function is not one number made of elementary operations.
         """
         point, values = ca.SX.sym("point", 2), ca.SX.sym("sizes", sizes)
-        return cls(ca.Function("family", [point, values], [function(point, values)]).serialize())
+        traced = ca.Function("family", [point, values], [function(point, values)])
+        if not traced.nnz_out() == traced.numel_out() == 1:
+            raise ValueError(f"the function of a family gives {traced.size_out(0)} numbers; it must give one")
+        steps = [_step(traced, k) for k in range(traced.n_instructions())]
+        return cls(json.dumps({"sizes": sizes, "steps": steps}))
 
     @property
     def function(self) -> ca.Function:
         """``(point, sizes) → F``."""
-        return _deserialized(self.text)
+        return _rebuilt(self.text)
 
     def __call__(self, point: ca.SX, shape: ca.SX) -> ca.SX:
         """Gap to ``shape = (x, y, ux, uy, growth, *sizes)``, turned from x to u: ``F / |∇F|`` less the growth."""
@@ -52,9 +79,44 @@ class Family:
         return value / ca.norm_2(ca.gradient(value, point)) - shape[4]
 
 
+def _step(function: ca.Function, k: int) -> list[Any]:
+    """An instruction as ``[name, result, *arguments]``; places of an input, a constant and the output take its form."""
+    name = NAMES.get(function.instruction_id(k))
+    if name is None:
+        raise ValueError(
+            "the function of a family calls another one; it must be made of CasADi's elementary operations"
+        )
+    if name == "CONST":
+        return [name, *function.instruction_output(k), function.instruction_constant(k)]
+    if name == "OUTPUT":
+        return [name, *function.instruction_input(k)]
+    return [name, *function.instruction_output(k), *function.instruction_input(k)]
+
+
 @lru_cache(maxsize=64)
-def _deserialized(text: str) -> ca.Function:
-    return ca.Function.deserialize(text)
+def _rebuilt(text: str) -> ca.Function:
+    """The function of a family's text; nothing but elementary operations is ever made of it."""
+    try:
+        read = json.loads(text)
+        if not 0 <= read["sizes"] <= SHAPE_SIZE - PLACE_SIZE:
+            raise ValueError("it has too many sizes")
+        inputs = ca.SX.sym("point", 2), ca.SX.sym("sizes", read["sizes"])
+        work: dict[int, ca.SX] = {}
+        for name, place, *arguments in read["steps"]:
+            if name == "INPUT":
+                which, index = arguments
+                work[place] = inputs[which][index]
+            elif name == "CONST":
+                work[place] = ca.SX(*map(float, arguments))
+            elif name in UNARY:
+                work[place] = ca.SX.unary(OPERATIONS[name], *(work[k] for k in arguments))
+            elif name in BINARY:
+                work[place] = ca.SX.binary(OPERATIONS[name], *(work[k] for k in arguments))
+            elif name == "OUTPUT":
+                return ca.Function("family", [*inputs], [work[place]])
+        raise ValueError("it has no output")
+    except (ValueError, TypeError, LookupError, AttributeError, NotImplementedError, RuntimeError) as error:
+        raise ValueError(f"text is {text!r:.40}…, no list of operations; families are made by Family.trace") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
