@@ -74,6 +74,32 @@ def test_a_compiler_that_fails_is_named(monkeypatch):
         )
 
 
+@pytest.mark.parametrize("command", ["", "  "])
+def test_an_empty_name_of_a_compiler_is_none(monkeypatch, command):
+    monkeypatch.setenv("CC", command)
+    Solver(Robot.prototype(), Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + 3 * p[1] ** 2 - 90), sizes=())]))
+
+
+def test_quotes_that_do_not_close_are_no_compiler(monkeypatch):
+    monkeypatch.setenv("CC", "gcc '")
+    with pytest.raises(RuntimeError, match="gcc ' is not there"):
+        Solver(Robot.prototype(), Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + p[1] ** 2 - 91), sizes=())]))
+
+
+NOEXEC = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
+
+
+def test_a_folder_that_nothing_runs_from_is_named(tmp_path):
+    run = (
+        f"mount -t tmpfs -o noexec,mode=700 none {tmp_path} && CCR_GYM_CACHE={tmp_path}/cache exec {sys.executable} -c"
+    )
+    if subprocess.run([*NOEXEC, f"mount -t tmpfs none {tmp_path}"], capture_output=True).returncode:
+        pytest.skip("needs mounts of its own")
+    done = subprocess.run([*NOEXEC, f"{run} '{SOLVE}'"], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "a compiled shape cannot be loaded" in done.stderr.splitlines()[-1]
+
+
 def test_outline():
     shape = egg()
     outline = shape.outline()
