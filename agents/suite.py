@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.actor import LearnedPolicy, Training
+from agents.actor import SUFFIX, LearnedPolicy, Training
 from agents.config import PRETRAINED, EvaluateConfig
 from agents.controllers import ForceController
 from agents.evaluate import METRICS, Episode, measure, run_episode
@@ -132,7 +132,7 @@ def entries(config: EvaluateConfig) -> list[Entry]:
 
 def trained(learner: str, env_id: str, folder: Path = PRETRAINED) -> tuple[Path, ...]:
     """Files of trained policies, in order of their training seeds; by default those that come with the package."""
-    return tuple(sorted((folder / learner / folder_name(env_id)).glob("*.pt")))
+    return tuple(sorted((folder / learner / folder_name(env_id)).glob(f"*{SUFFIX}")))
 
 
 def folder_name(env_id: str) -> str:
