@@ -157,7 +157,7 @@ class LearnedPolicy:
     """
 
     def __init__(self, path: Path) -> None:
-        path = path / ACTOR if path.is_dir() else path
+        path = path if path.suffix == SUFFIX else path / ACTOR
         if not path.is_file():
             raise FileNotFoundError(f"{path} is missing; train first: ccr-gym train --run {path.parent}")
         try:
