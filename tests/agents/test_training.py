@@ -141,9 +141,12 @@ def test_a_learner_is_restored_bit_for_bit(name, tmp_path, monkeypatch, killed):
     assert fresh.num_timesteps == run.progress.steps
 
 
+ROLLOUTS = {"PPO": 24, "Distilled": 8}  # a checkpoint after each
 LEARNING = {
-    "PPO": PPOSettings(steps=24_576, envs=16, rollout=64, batch_size=128, epochs=6, width=32),
-    "Distilled": DistilledSettings(steps=8 * 24 * 64, envs=24, gradient_steps=60, batch_size=256, width=32),
+    "PPO": PPOSettings(steps=ROLLOUTS["PPO"] * 1024, envs=16, rollout=64, batch_size=128, epochs=6, width=32),
+    "Distilled": DistilledSettings(
+        steps=ROLLOUTS["Distilled"] * 1536, envs=24, gradient_steps=60, batch_size=256, width=32
+    ),
 }
 
 
@@ -153,12 +156,12 @@ def test_a_run_killed_after_every_checkpoint_learns_as_one_left_alone(name, tmp_
     for module in (training, distillation):
         monkeypatch.setattr(module, "VALIDATION_EPISODES", 16)
         monkeypatch.setattr(module, "CURVE_POINTS", 4)
-    monkeypatch.setattr(checkpoint, "CHECKPOINTS", 8)
+    monkeypatch.setattr(checkpoint, "CHECKPOINTS", ROLLOUTS[name])
     told = {"env_id": "CCR/LoadCell-v0", "sensing": "ideal", "learner": LEARNING[name], "threads": 1}
     alone = until_finished(TrainConfig(run=tmp_path / "alone", **told)).training.curve.returns
     kills = request.getfixturevalue("killed")
     killed = until_finished(TrainConfig(run=tmp_path / "killed", **told)).training.curve.returns
-    assert kills[0] >= 7
+    assert kills[0] >= ROLLOUTS[name] - 1
     assert len(killed) == len(alone)
     assert killed[-1] > alone[-1] - 15
     if name != "Distilled":  # which has learnt nearly all in its first round
