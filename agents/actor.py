@@ -4,6 +4,8 @@ One file holds all of it: tensors, of which the weights in half precision, and t
 its critics are needed.
 """
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -141,6 +143,26 @@ def export(path: Path, network: Network, seen: RunningMeanStd, training: Trainin
     write_tensors(path, weights | {name: value.float() for name, value in scaling.items()}, values)
 
 
+@contextmanager
+def _refusing_others(path: Path) -> Iterator[None]:
+    """While a file is read: whatever goes wrong is told as what it is."""
+    try:
+        yield
+    except Exception as error:
+        raise UserError(f"{path} is not a trained policy: {error!r}") from error
+
+
+def _training(tensors: Mapping[str, torch.Tensor], values: Mapping[str, Any]) -> Training:
+    """How the policy of a file was made."""
+    if values["format"] != FORMAT:
+        raise ValueError(f"its format is {values['format']}; this version reads {FORMAT}: train it anew")
+    if not all(tensor.isfinite().all() for tensor in tensors.values()):
+        raise ValueError("its weights are not finite")
+    told = values["training"]
+    curve = Curve(tuple(told["steps"]), tuple(told["returns"]))
+    return Training(TrainConfig.loads(values["config"]), curve, float(told["seconds"]))
+
+
 class LearnedPolicy:
     """A trained policy.
 
@@ -160,31 +182,21 @@ class LearnedPolicy:
         path = path if path.suffix == SUFFIX else path / ACTOR
         if not path.is_file():
             raise FileNotFoundError(f"{path} is missing; train first: ccr-gym train --run {path.parent}")
-        try:
-            self._read(*read_tensors(path))
-        except Exception as error:
-            raise UserError(f"{path} is not a trained policy: {error!r}") from error
-
-    def _read(self, tensors: dict[str, torch.Tensor], values: dict[str, Any]) -> None:
-        if values["format"] != FORMAT:
-            raise ValueError(f"its format is {values['format']}; this version reads {FORMAT}: train it anew")
-        if not all(tensor.isfinite().all() for tensor in tensors.values()):
-            raise ValueError("its weights are not finite")
-        config, training = TrainConfig.loads(values["config"]), values["training"]
-        curve = Curve(tuple(training["steps"]), tuple(training["returns"]))
-        self.training, self.name = Training(config, curve, float(training["seconds"])), config.learner.name
-        env = gymnasium.make(config.env_id, sensing=config.sensing, disable_env_checker=True)
-        assert isinstance(env.observation_space, spaces.Dict)
-        assert isinstance(env.action_space, spaces.Box)
+        with _refusing_others(path):
+            tensors, values = read_tensors(path)
+            self.training = _training(tensors, values)
+        config = self.training.config
+        self.name, self._state = config.learner.name, None
+        env: Any = gymnasium.make(config.env_id, sensing=config.sensing, disable_env_checker=True)
         self._sizes = {key: box.shape for key, box in env.observation_space.items()}
         recurrent = isinstance(config.learner, RecurrentPPOSettings)
         self._memory = None if recurrent else Memory(env.observation_space, 1, env.get_wrapper_attr("settings"))
-        self._state: Any = None
         inputs = spaces.flatdim(env.observation_space) if self._memory is None else self._memory.size
-        self._mean, self._deviation = (tensors[name].numpy().reshape(inputs) for name in ("mean", "deviation"))
-        self._network = Network(inputs, env.action_space.shape[0], config.learner)
-        weights = {name: value.float() for name, value in tensors.items() if name.startswith(WEIGHTS)}
-        self._network.load_state_dict({name.removeprefix(WEIGHTS): value for name, value in weights.items()})
+        with _refusing_others(path):
+            self._mean, self._deviation = (tensors[name].numpy().reshape(inputs) for name in ("mean", "deviation"))
+            self._network = Network(inputs, env.action_space.shape[0], config.learner)
+            weights = {name: value.float() for name, value in tensors.items() if name.startswith(WEIGHTS)}
+            self._network.load_state_dict({name.removeprefix(WEIGHTS): value for name, value in weights.items()})
 
     def reset(self, env: Any = None) -> None:
         """Forget the episode before."""

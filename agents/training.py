@@ -39,15 +39,18 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
         if is_finished(config):  # by now
             return config.run
         if config.restart:
-            delete(config.run)
+            delete(config.run, ACTOR, PARTIAL + ACTOR, CHECKPOINT)
         run = Run(config)
         if run.state is None:
             delete(config.run, EVENTS)
             config.save(config.run / CONFIG)
-        network, scaling = _learn(run, progress)
+        try:
+            network, scaling = _learn(run, progress)
+        except OSError as error:  # of the log: all else tells its file
+            raise UserError(f"{config.run / LOG} cannot be written: {error.strerror or error}") from error
         curve = Curve(tuple(run.progress.curve_steps), tuple(run.progress.curve_returns))
         export(config.run / ACTOR, network, scaling, Training(config, curve, run.seconds))
-        delete(config.run, CHECKPOINT)
+        delete(config.run, CHECKPOINT, PARTIAL + CHECKPOINT)
     return config.run
 
 
@@ -109,8 +112,8 @@ def is_finished(config: TrainConfig) -> bool:
 
 
 def delete(folder: Path, *names: str) -> None:
-    """Delete what a run wrote into its folder, all of it or what is named, and nothing else."""
-    for name in names or (ACTOR, CHECKPOINT, PARTIAL + ACTOR, PARTIAL + CHECKPOINT, EVENTS, CONFIG):
+    """Delete some of what a run wrote into its folder, and its log folder if that leaves it empty."""
+    for name in names:
         for path in folder.glob(name):
             path.unlink()
     with contextlib.suppress(OSError):  # not there, or other files are

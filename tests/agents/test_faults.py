@@ -140,6 +140,12 @@ def test_training_on_a_full_disk_goes_on_when_there_is_space(size, file, tmp_pat
     assert LearnedPolicy(run).training.curve.returns
 
 
+def test_a_log_that_cannot_be_written_is_named(tmp_path):
+    many = [*SMALL[:5], "--rollout", 8, *SMALL[7:]]
+    code, lines = ended(started("train", "--run", tmp_path, *many, "--steps", 100_000, preexec_fn=limited(40_000)))
+    assert_one_line(code, lines, f"{tmp_path / 'log_1'} cannot be written: File too large")
+
+
 def test_evaluating_on_a_full_disk_leaves_nothing_half_written(tmp_path):
     arguments = ["--env-ids", "CCR/LoadCell-v0", "--policies", "PI", "P", "--episodes", 8, "--no-video", "--jobs", 1]
     out = tmp_path / "out"
