@@ -192,7 +192,7 @@ class BenchConfig:
     """Measure the kernel, the environments and a learner on them, beside peers in the same run."""
 
     steps: int = 200_000
-    """Steps of the contact mix."""
+    """Steps of the contact mix, in thousands: 100 or 200 a scene."""
     rivals: int = 200
     """Of these, how many IPOPT repeats."""
     seeds: int = 1
@@ -201,7 +201,9 @@ class BenchConfig:
     """File the numbers are written to."""
 
     def __post_init__(self) -> None:
-        _positive(self, "steps", "rivals", "seeds")
+        _positive(self, "rivals", "seeds")
+        if self.steps < 1000 or self.steps % 1000:
+            raise ValueError(f"steps is {self.steps}; it must be at least 1000, and a multiple of it")
 
 
 @dataclass(frozen=True, slots=True)

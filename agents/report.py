@@ -55,7 +55,8 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
     draw_profiles(
         {env_id: {r.entry.policy: r.rmse.ravel() for r in here} for env_id, here in by_id.items()}, config.out
     )
-    draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
+    if any(result.trainings for result in results):
+        draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
     show(by_id)
 
 

@@ -148,6 +148,7 @@ def test_a_sweep_finds_settings_of_every_learner(learner, tmp_path, monkeypatch)
         ("train", "sac", "--tau", "-1"),
         ("train", "sarsa"),
         ("bench", "--steps", "0"),
+        ("bench", "--steps", "150"),
         ("bench", "--seeds", "0"),
     ],
 )
