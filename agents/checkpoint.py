@@ -23,7 +23,8 @@ from agents.errors import UserError
 from agents.tensors import read_tensors, write_tensors
 
 CHECKPOINT = "checkpoint.safetensors"
-CHECKPOINTS = 20  # in a run
+CHECKPOINTS = 20  # in a run, at most
+WRITING = 0.05  # share of a run's time that writing them may take
 REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 Tensors = dict[str, torch.Tensor]
 
@@ -88,7 +89,7 @@ class Run:
                 self.progress, self.state = Progress(**values["progress"]), State(tensors, values["counters"])
         self._began = time.perf_counter() - self.progress.seconds
         self.seed = config.seed if self.state is None else _another_seed(config, self.progress.steps)
-        self._plan()
+        self._plan(0.0)
 
     @property
     def seconds(self) -> float:
@@ -105,11 +106,12 @@ class Run:
         Raises:
             UserError: If it cannot be written; the one before is kept.
         """
-        if steps >= self._next:
-            self.progress.steps, self.progress.seconds = steps, self.seconds
+        began = self.seconds
+        if steps >= self._next and began >= self._rested:
+            self.progress.steps, self.progress.seconds = steps, began
             kept, progress = state(), {name: getattr(self.progress, name) for name in Progress.__slots__}
             write_tensors(self._path, kept.tensors, {"progress": progress, "counters": kept.counters})
-            self._plan()
+            self._plan(self.seconds - began)
 
     @contextmanager
     def refusing_damage(self) -> Iterator[None]:
@@ -123,8 +125,10 @@ class Run:
         except Exception as error:
             raise UserError(f"{self._path} is damaged ({error!r}); begin again with --restart") from error
 
-    def _plan(self) -> None:
+    def _plan(self, took: float) -> None:
+        """Say when the next one is due, after one that took some seconds."""
         self._next = self.progress.steps + max(self.config.learner.steps // CHECKPOINTS, 1)
+        self._rested = self.seconds + took / WRITING
 
 
 def _another_seed(config: TrainConfig, steps: int) -> int:

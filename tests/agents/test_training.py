@@ -34,6 +34,7 @@ SMALL = {
 def few_validation_episodes(monkeypatch):
     monkeypatch.setattr(training, "VALIDATION_EPISODES", 4)
     monkeypatch.setattr(training, "CURVE_POINTS", 3)
+    monkeypatch.setattr(checkpoint, "WRITING", np.inf)
 
 
 @pytest.mark.parametrize("name", sorted(SMALL))
@@ -166,6 +167,23 @@ def test_a_run_killed_after_every_checkpoint_learns_as_one_left_alone(name, tmp_
     assert killed[-1] > alone[-1] - 15
     if name != "Distilled":  # which has learnt nearly all in its first round
         assert min(alone[-1], killed[-1]) > max(alone[0], killed[0]) + 15
+
+
+def test_writing_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
+    def write(*_):
+        written.append(clock[0])
+        clock[0] += 1.0
+
+    clock, written = [0.0], []
+    monkeypatch.setattr(checkpoint.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(checkpoint, "write_tensors", write)
+    monkeypatch.setattr(checkpoint, "WRITING", 0.05)
+    run = checkpoint.Run(TrainConfig(run=tmp_path, learner=PPOSettings(steps=100)))
+    for steps in range(1, 101):
+        clock[0] += 1.0
+        run.keep(steps, lambda: checkpoint.State({}))
+    assert len(written) == 5
+    assert np.diff(written).min() >= 20
 
 
 def test_a_checkpoint_that_was_being_written_does_not_count(tmp_path, monkeypatch):
