@@ -1,9 +1,11 @@
 """A trained policy alone: the small network that acts, its normaliser, its configuration and its learning curve.
 
-One file holds all of it: tensors in half precision and text, no code. Neither the learner nor its critics are needed.
+One file holds all of it: tensors, of which the weights in half precision, and text, no code. Neither the learner nor
+its critics are needed.
 """
 
-import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,12 +21,16 @@ from torch import nn
 
 import ccr_gym  # noqa: F401 - registers the ids
 from agents.config import TrainConfig
+from agents.errors import UserError
 from agents.memory import Memory
 from agents.policy import Observation
+from agents.tensors import read_tensors, write_tensors
 from agents.tuned import LearnerSettings, RecurrentPPOSettings, SACSettings
 
-ACTOR = "actor.pt"
-FORMAT = 1
+SUFFIX = ".safetensors"
+ACTOR = f"actor{SUFFIX}"
+FORMAT = 2
+WEIGHTS = "weights."  # before the names of the network's tensors
 CLIP = 10.0  # of scaled rows
 EPSILON = 1e-8  # of their variance
 
@@ -123,19 +129,38 @@ def export(path: Path, network: Network, seen: RunningMeanStd, training: Trainin
         network: Trained on scaled rows.
         seen: Mean and variance that rows are scaled by.
         training: How it was made.
+
+    Raises:
+        UserError: If it cannot be written.
     """
-    told = {**asdict(training.curve), "seconds": training.seconds}
-    written = {
+    weights = {f"{WEIGHTS}{name}": value.half() for name, value in network.state_dict().items()}
+    scaling = {"mean": torch.tensor(seen.mean), "deviation": torch.tensor(deviation(seen))}
+    values = {
         "format": FORMAT,
         "config": replace(training.config, run=Path()).dumps(),
-        "training": json.dumps(told),
-        "mean": torch.tensor(seen.mean, dtype=torch.float32),
-        "deviation": torch.tensor(deviation(seen), dtype=torch.float32),
-        "weights": {name: value.half() for name, value in network.state_dict().items()},
+        "training": {**asdict(training.curve), "seconds": training.seconds},
     }
-    partial = path.with_suffix(".partial")
-    torch.save(written, partial)
-    partial.replace(path)
+    write_tensors(path, weights | {name: value.float() for name, value in scaling.items()}, values)
+
+
+@contextmanager
+def _refusing_others(path: Path) -> Iterator[None]:
+    """While a file is read: whatever goes wrong is told as what it is."""
+    try:
+        yield
+    except Exception as error:
+        raise UserError(f"{path} is not a trained policy: {error!r}") from error
+
+
+def _training(tensors: Mapping[str, torch.Tensor], values: Mapping[str, Any]) -> Training:
+    """How the policy of a file was made."""
+    if values["format"] != FORMAT:
+        raise ValueError(f"its format is {values['format']}; this version reads {FORMAT}: train it anew")
+    if not all(tensor.isfinite().all() for tensor in tensors.values()):
+        raise ValueError("its weights are not finite")
+    told = values["training"]
+    curve = Curve(tuple(told["steps"]), tuple(told["returns"]))
+    return Training(TrainConfig.loads(values["config"]), curve, float(told["seconds"]))
 
 
 class LearnedPolicy:
@@ -150,34 +175,28 @@ class LearnedPolicy:
 
     Raises:
         FileNotFoundError: If there is no such file.
-        ValueError: If it is something else.
+        UserError: If it is something else.
     """
 
     def __init__(self, path: Path) -> None:
-        path = path / ACTOR if path.is_dir() else path
+        path = path if path.suffix == SUFFIX else path / ACTOR
         if not path.is_file():
             raise FileNotFoundError(f"{path} is missing; train first: ccr-gym train --run {path.parent}")
-        try:
-            read = torch.load(path, weights_only=True)
-            if read["format"] != FORMAT:
-                raise ValueError(f"its format is {read['format']}; this version reads {FORMAT}: train it anew")
-            config, told = TrainConfig.loads(read["config"]), json.loads(read["training"])
-            curve = Curve(tuple(told["steps"]), tuple(told["returns"]))
-            self.training = Training(config, curve, float(told["seconds"]))
-            self._mean, self._deviation = read["mean"].numpy(), read["deviation"].numpy()
-            weights = {name: value.float() for name, value in read["weights"].items()}
-            actions = len(weights[list(weights)[-1]])
-            self._network = Network(self._mean.size, actions, config.learner)
-            self._network.load_state_dict(weights)
-        except Exception as error:
-            raise ValueError(f"{path} is not a trained policy: {error!r}") from error
-        self.name = config.learner.name
-        env = gymnasium.make(config.env_id, sensing=config.sensing, disable_env_checker=True)
-        assert isinstance(env.observation_space, spaces.Dict)
+        with _refusing_others(path):
+            tensors, values = read_tensors(path)
+            self.training = _training(tensors, values)
+        config = self.training.config
+        self.name, self._state = config.learner.name, None
+        env: Any = gymnasium.make(config.env_id, sensing=config.sensing, disable_env_checker=True)
         self._sizes = {key: box.shape for key, box in env.observation_space.items()}
         recurrent = isinstance(config.learner, RecurrentPPOSettings)
         self._memory = None if recurrent else Memory(env.observation_space, 1, env.get_wrapper_attr("settings"))
-        self._state: Any = None
+        inputs = spaces.flatdim(env.observation_space) if self._memory is None else self._memory.size
+        with _refusing_others(path):
+            self._mean, self._deviation = (tensors[name].numpy().reshape(inputs) for name in ("mean", "deviation"))
+            self._network = Network(inputs, env.action_space.shape[0], config.learner)
+            weights = {name: value.float() for name, value in tensors.items() if name.startswith(WEIGHTS)}
+            self._network.load_state_dict({name.removeprefix(WEIGHTS): value for name, value in weights.items()})
 
     def reset(self, env: Any = None) -> None:
         """Forget the episode before."""

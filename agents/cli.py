@@ -1,112 +1,45 @@
-"""The ``ccr-gym`` command."""
+"""The ``ccr-gym`` command: what goes wrong outside it ends in one line; anything else is a bug and shows where."""
 
-from typing import Annotated, Any
+import sys
+import threading
 
-try:
-    import tyro
-except ModuleNotFoundError as error:
-    raise SystemExit('the ccr-gym command needs its extra: pip install "ccr-gym[agents]"') from error
+from agents.errors import UserError
 
-from agents.config import (
-    BenchConfig,
-    EvaluateConfig,
-    ReproduceConfig,
-    RetrainConfig,
-    SweepConfig,
-    TrainConfig,
-)
-
-Command = (
-    Annotated[TrainConfig, tyro.conf.subcommand("train")]
-    | Annotated[EvaluateConfig, tyro.conf.subcommand("evaluate")]
-    | Annotated[RetrainConfig, tyro.conf.subcommand("retrain")]
-    | Annotated[SweepConfig, tyro.conf.subcommand("sweep")]
-    | Annotated[BenchConfig, tyro.conf.subcommand("bench")]
-    | Annotated[ReproduceConfig, tyro.conf.subcommand("reproduce")]
-)
-
-
-def train(config: TrainConfig) -> None:
-    """Train a policy on an environment, or go on with a run that was interrupted."""
-    from gymnasium.error import UnregisteredEnv
-
-    from agents.training import train as run
-
-    try:
-        folder = run(config)
-    except (UnregisteredEnv, ValueError) as error:
-        raise SystemExit(str(error)) from error
-    print(f"Trained {config.learner.name} for {config.learner.steps} steps on {config.env_id}; saved to {folder}")
-
-
-def evaluate(config: EvaluateConfig) -> None:
-    """Evaluate policies on test scenes they were never trained or tuned on."""
-    from rich.progress import track
-
-    from agents import report, suite
-
-    try:
-        played = suite.entries(config)
-    except (FileNotFoundError, ValueError) as error:
-        raise SystemExit(str(error)) from error
-    (config.out / "videos").mkdir(parents=True, exist_ok=True)
-    results = list(track(suite.play_all(config, played), "evaluate", len(played)))
-    report.write(sorted(results, key=lambda result: played.index(result.entry)), config)
-    print("Force error: root mean square after the search, interquartile mean with its 95 % interval.")
-    print(f"closed: share of the way from {report.RIVAL} to {report.BOUND}; * where the intervals are disjoint.")
-    print(f"Written: {config.out}/evaluation.json, evaluation.md, figures and videos")
-
-
-def retrain(config: RetrainConfig) -> None:
-    """Train every learned baseline on every environment, as the shipped policies were."""
-    from agents.retrain import retrain as run
-
-    try:
-        run(config)
-    except ValueError as error:
-        raise SystemExit(str(error)) from error
-
-
-def sweep(config: SweepConfig) -> None:
-    """Search settings of a controller or a learner on training scenes, with Optuna."""
-    from agents.sweep import sweep as run
-
-    study = run(config)
-    print(f"Best of {len(study.trials)}: {study.best_value:.3f} mN with {study.best_params}")
-
-
-def bench(config: BenchConfig) -> None:
-    """Measure the kernel, the environments and a learner on them, beside peers in the same run."""
-    from agents.bench.report import bench as run
-
-    run(config)
-
-
-def reproduce(config: ReproduceConfig) -> None:
-    """Regenerate the paper's figures and table, and check its claims in numbers."""
-    from agents.reproduce import reproduce as run
-
-    for claim in run(config.out):
-        print(f"{'holds' if claim.holds else 'DOES NOT HOLD'}: {claim.sentence}\n    {claim.found}")
-    print(f"Written: {config.out}/paper.json, {config.out}/paper.png")
+INTERRUPTED, WRONG = 130, 2  # exit codes
 
 
 def main() -> None:
     """Entry point."""
-    command: Any = tyro.cli(
-        Command, prog="ccr-gym", config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes)
-    )
-    COMMANDS[type(command)](command)
+    before, threading.excepthook = threading.excepthook, _tell_bugs
+    try:
+        from agents.commands import run  # an interrupt may come while this loads
+
+        run()
+    except ModuleNotFoundError as error:
+        if error.name != "tyro":
+            raise
+        sys.exit('the ccr-gym command needs its extra: pip install "ccr-gym[agents]"')
+    except KeyboardInterrupt:
+        _end("interrupted; train, retrain and sweep go on with the same command", INTERRUPTED)
+    except UserError as error:
+        _end(str(error), WRONG)
+    except OSError as error:
+        told = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        _end(told, WRONG)
+    finally:
+        threading.excepthook = before
 
 
-COMMANDS: dict[type, Any] = {
-    TrainConfig: train,
-    EvaluateConfig: evaluate,
-    RetrainConfig: retrain,
-    SweepConfig: sweep,
-    BenchConfig: bench,
-    ReproduceConfig: reproduce,
-}
+def _tell_bugs(caught: threading.ExceptHookArgs) -> None:
+    """Say nothing of a log that cannot be written: its writer raises that again where it is called."""
+    if not issubclass(caught.exc_type, OSError):
+        threading.__excepthook__(caught)
+
+
+def _end(line: str, code: int) -> None:
+    print(f"ccr-gym: {line}", file=sys.stderr)
+    sys.exit(code)
+
 
 if __name__ == "__main__":
     main()

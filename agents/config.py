@@ -1,19 +1,31 @@
 """What the commands are told."""
 
 import json
+import math
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
-from agents.tuned import LEARNERS, DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings
+from agents.errors import UserError
+from agents.files import write_text
+from agents.tuned import LEARNERS, DistilledSettings, LearnerSettings, PPOSettings, RecurrentPPOSettings, SACSettings
 from ccr_gym import ENV_IDS
 
 VALIDATION_SEED = 900_000  # training seeds stay below; learning curves are of seeds from here on
 VALIDATION_EPISODES = 64
 CURVE_POINTS = 15  # of a run
 EVALUATION_SEED = 1_000_000  # evaluation seeds begin here
+
+RANGES = {  # of settings of learners that are no counts
+    "gamma": (0.0, 1.0),
+    "gae_lambda": (0.0, 1.0),
+    "tau": (0.0, 1.0),
+    "learning_rate": (0.0, 1.0),
+    "log_std_init": (-20.0, 2.0),
+    "huber": (1e-9, 1e9),
+}
 
 POLICIES = ("P", "PI", "MPC", "Newton", *LEARNERS, "Oracle")
 PRETRAINED = Path(__file__).parent / "pretrained"
@@ -40,27 +52,34 @@ class TrainConfig:
     """Seed of the learner and of the first environment's scenes; below 900 000, where validation begins."""
     threads: int = 2
     """Threads of the solver; results do not depend on them."""
+    restart: bool = False
+    """Begin again: what this run has written so far is deleted, and nothing else."""
     learner: Annotated[Learner, tyro.conf.arg(name="")] = field(default_factory=PPOSettings)
     """The learner and its settings."""
 
     def __post_init__(self) -> None:
         learner = self.learner
-        _positive(learner, *(name for name, value in asdict(learner).items() if isinstance(value, int)))
+        _known("env_id", (self.env_id,), tuple(ENV_IDS))
+        _known("sensing", (self.sensing,), ("ideal", "realistic"))
+        _positive(self, "threads")
+        _check_learner(learner)
         if not 0 <= self.seed <= VALIDATION_SEED - learner.envs:
             raise ValueError(f"seed is {self.seed}; it must be from 0 to {VALIDATION_SEED - learner.envs}")
 
     def matches(self, other: "TrainConfig") -> bool:
         """Whether both make the same policy, wherever and on however many threads."""
-        return replace(self, run=other.run, threads=other.threads) == other
+        return replace(self, run=other.run, threads=other.threads, restart=other.restart) == other
 
     def dumps(self) -> str:
         """As JSON."""
         learner = {"name": self.learner.name, **asdict(self.learner)}
-        return json.dumps({**asdict(self), "run": str(self.run), "learner": learner}, indent=2)
+        values = {**asdict(self), "run": str(self.run), "learner": learner}
+        del values["restart"]
+        return json.dumps(values, indent=2)
 
     def save(self, path: Path) -> None:
         """Write as JSON."""
-        path.write_text(self.dumps() + "\n")
+        write_text(path, self.dumps() + "\n")
 
     @classmethod
     def loads(cls, text: str) -> "TrainConfig":
@@ -74,7 +93,7 @@ class TrainConfig:
             settings = dict(values["learner"])
             learner = LEARNERS[settings.pop("name")](**settings)
             return cls(**values | {"run": Path(values["run"]), "learner": learner})
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, LookupError, TypeError, RecursionError) as error:
             raise ValueError(f"it is not the configuration of a training run: {error!r}") from error
 
     @classmethod
@@ -82,12 +101,12 @@ class TrainConfig:
         """Read what :meth:`save` wrote.
 
         Raises:
-            ValueError: If it is something else.
+            UserError: If it is something else.
         """
         try:
             return cls.loads(path.read_text())
         except ValueError as error:
-            raise ValueError(f"{path}: {error}") from error
+            raise UserError(f"{path}: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,13 +192,18 @@ class BenchConfig:
     """Measure the kernel, the environments and a learner on them, beside peers in the same run."""
 
     steps: int = 200_000
-    """Steps of the contact mix."""
+    """Steps of the contact mix, in thousands: 100 or 200 a scene."""
     rivals: int = 200
     """Of these, how many IPOPT repeats."""
     seeds: int = 1
     """Seeds that PPO is trained with."""
     json: Path | None = Path("runs/bench.json")
     """File the numbers are written to."""
+
+    def __post_init__(self) -> None:
+        _positive(self, "rivals", "seeds")
+        if self.steps < 1000 or self.steps % 1000:
+            raise ValueError(f"steps is {self.steps}; it must be at least 1000, and a multiple of it")
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +218,20 @@ def _known(name: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:
     unknown = [value for value in given if value not in known]
     if unknown or not given:
         raise ValueError(f"{name} is {list(given)}; it must name some of {', '.join(known)}")
+
+
+def _check_learner(learner: LearnerSettings) -> None:
+    """Raise ``ValueError`` where a setting is of another type than its default, or out of its range."""
+    for name, value in asdict(learner).items():
+        kind = type(getattr(type(learner)(), name))
+        if not isinstance(value, (int, kind)):
+            raise ValueError(f"{name} is {value!r}; it must be of type {kind.__name__}")
+        low, high = RANGES.get(name, (-math.inf, math.inf))
+        if not (math.isfinite(value) and low <= value <= high):
+            raise ValueError(f"{name} is {value}; it must be from {low} to {high}")
+    _positive(learner, *(name for name, value in asdict(type(learner)()).items() if isinstance(value, int)))
+    if getattr(learner, "epochs", 0) and min(learner.batch_size, learner.envs * getattr(learner, "rollout", 1)) < 2:
+        raise ValueError("batch_size and envs times rollout must be at least 2: advantages are scaled by their spread")
 
 
 def _positive(settings: Any, *names: str) -> None:

@@ -5,6 +5,7 @@ G. Gordon, D. Bagnell, "A reduction of imitation learning and structured predict
 (DAgger), AISTATS 2011. What cannot be known from the history is averaged over.
 """
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,9 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import nn
 from torch.utils.tensorboard import SummaryWriter
 
-from agents.actor import EPSILON, Curve, Network, deviation, scaled
-from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
+from agents.actor import EPSILON, Network, deviation, scaled
+from agents.checkpoint import Run, State, flat, nested, restore_statistics, statistics_tensors
+from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED
 from agents.learners import environments
 from agents.policy import Observation, effort, search
 from agents.tuned import DistilledSettings
@@ -65,35 +67,71 @@ class Student:
             return self.network(self.scaled(rows))[0].numpy(), state
 
 
-def distill(config: TrainConfig, settings: DistilledSettings, progress: bool) -> tuple[Network, RunningMeanStd, Curve]:
-    """Train a student; its network, what its rows are scaled by, and its learning curve."""
+class Imitation:
+    """A student, what it has been taught so far, and its optimiser.
+
+    Args:
+        inputs: Numbers of a row.
+        actions: Numbers of an action.
+        settings: Of the learner.
+    """
+
+    def __init__(self, inputs: int, actions: int, settings: DistilledSettings) -> None:
+        self.student, self.settings = Student(Network(inputs, actions, settings), inputs), settings
+        self.count = settings.envs * settings.rollout  # steps of a round
+        self.rounds = max(1, settings.steps // self.count)
+        self.rows = np.zeros((self.rounds * self.count, inputs), np.float32)
+        self.taught = np.zeros((self.rounds * self.count, actions), np.float32)
+        self.adam = torch.optim.Adam(self.student.network.parameters(), lr=settings.learning_rate)
+
+    def state(self, steps: int) -> State:
+        """What it goes on with after some steps."""
+        tensors = flat({"network": self.student.network.state_dict(), "adam": self.adam.state_dict()})
+        kept = {"rows": torch.from_numpy(self.rows[:steps]), "taught": torch.from_numpy(self.taught[:steps])}
+        return State(tensors | kept | statistics_tensors("observations", self.student.seen))
+
+    def restore(self, steps: int, state: State) -> None:
+        """Undo :meth:`state`.
+
+        Raises:
+            Exception: Any, if the state is not of such a learner.
+        """
+        states = {"network": self.student.network.state_dict(), "adam": self.adam.state_dict()}
+        filled = nested(state.tensors, states)
+        self.student.network.load_state_dict(filled["network"])
+        self.adam.load_state_dict(filled["adam"])
+        self.rows[:steps], self.taught[:steps] = (state.tensors[name].numpy() for name in ("rows", "taught"))
+        restore_statistics("observations", self.student.seen, state.tensors)
+
+
+def distill(run: Run, settings: DistilledSettings, log: Path, progress: bool) -> tuple[Network, RunningMeanStd]:
+    """Train a student to the end of a run; its network, and what its rows are scaled by."""
+    config, seed = run.config, run.seed
     torch.manual_seed(config.seed)
-    generator = np.random.default_rng(config.seed)
-    envs = environments(config, settings.envs, config.seed)
+    generator = np.random.default_rng(seed)
+    envs = environments(config, settings.envs, seed)
     validation = environments(config, VALIDATION_EPISODES, VALIDATION_SEED)
     (inputs,), (actions,) = envs.observation_space.shape or (), envs.action_space.shape or ()
-    student = Student(Network(inputs, actions, settings), inputs)
-    rounds = max(1, settings.steps // (settings.envs * settings.rollout))
-    count = settings.envs * settings.rollout
-    kept = np.zeros((rounds * count, inputs), np.float32), np.zeros((rounds * count, actions), np.float32)
-    adam = torch.optim.Adam(student.network.parameters(), lr=settings.learning_rate)
-    fading = torch.optim.lr_scheduler.LinearLR(adam, 1.0, 0.0, rounds * settings.gradient_steps)
-    steps, returns, rows = [], [], envs.reset()
-    with SummaryWriter(str(config.run / "log_1")) as log:
-        for done in track(range(rounds), "distil", disable=not progress):
-            here = slice(done * count, (done + 1) * count)
+    imitation = Imitation(inputs, actions, settings)
+    student = imitation.student
+    if run.state:
+        with run.refusing_damage():
+            imitation.restore(run.progress.steps, run.state)
+    first, rows = run.progress.steps // imitation.count, envs.reset()
+    with SummaryWriter(str(log)) as writer:
+        for done in track(range(first, imitation.rounds), "distil", disable=not progress):
+            here = slice(done * imitation.count, (done + 1) * imitation.count)
             share = max(0.0, 1 - done / settings.weaning)
-            rows = _play(envs, student, rows, (kept[0][here], kept[1][here]), share, generator)
-            student.seen.update(kept[0][here])
-            loss = _learn(student, kept[0][: here.stop], kept[1][: here.stop], settings, adam, fading, generator)
-            log.add_scalar("train/loss", loss, here.stop)
-            if (done + 1) % max(1, rounds // CURVE_POINTS) == 0:
+            rows = _play(envs, student, rows, (imitation.rows[here], imitation.taught[here]), share, generator)
+            student.seen.update(imitation.rows[here])
+            writer.add_scalar("train/loss", _learn(imitation, done, generator), here.stop)
+            if (done + 1) % max(1, imitation.rounds // CURVE_POINTS) == 0:
                 played: Any = student
                 mean: Any = evaluate_policy(played, validation, VALIDATION_EPISODES)[0]
-                steps.append(here.stop)
-                returns.append(float(mean))
-                log.add_scalar("eval/mean_reward", returns[-1], here.stop)
-    return student.network, student.seen, Curve(tuple(steps), tuple(returns))
+                run.progress.validated(here.stop, float(mean))
+                writer.add_scalar("eval/mean_reward", float(mean), here.stop)
+            run.keep(here.stop, lambda: imitation.state(here.stop))  # noqa: B023 - called at once
+    return student.network, student.seen
 
 
 def _play(
@@ -115,24 +153,19 @@ def _play(
     return rows
 
 
-def _learn(
-    student: Student,
-    rows: np.ndarray,
-    taught: np.ndarray,
-    settings: DistilledSettings,
-    adam: torch.optim.Optimizer,
-    fading: torch.optim.lr_scheduler.LRScheduler,
-    generator: np.random.Generator,
-) -> float:
-    """Gradient steps on batches of all that is kept; the mean loss."""
-    total = 0.0
-    for _ in range(settings.gradient_steps):
-        batch = generator.integers(len(rows), size=settings.batch_size)
-        acts = student.network.unbounded(student.scaled(rows[batch]))
-        loss = nn.functional.huber_loss(acts, torch.from_numpy(taught[batch]), delta=settings.huber)
-        adam.zero_grad()
+def _learn(imitation: Imitation, done: int, generator: np.random.Generator) -> float:
+    """Gradient steps on batches of all that is kept after some rounds; the mean loss."""
+    settings, student, total = imitation.settings, imitation.student, 0.0
+    seen, steps = (done + 1) * imitation.count, settings.gradient_steps
+    for k in range(done * steps, (done + 1) * steps):
+        for group in imitation.adam.param_groups:
+            group["lr"] = settings.learning_rate * (1 - k / (imitation.rounds * steps))
+        batch = generator.integers(seen, size=settings.batch_size)
+        acts = student.network.unbounded(student.scaled(imitation.rows[batch]))
+        taught = torch.from_numpy(imitation.taught[batch])
+        loss = nn.functional.huber_loss(acts, taught, delta=settings.huber)
+        imitation.adam.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
-        adam.step()
-        fading.step()
+        imitation.adam.step()
         total += loss.item()
-    return total / settings.gradient_steps
+    return total / steps

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from agents.actor import Curve
 from agents.config import POLICIES
 from agents.evaluate import Episode
+from agents.files import replacing
 from agents.statistics import profile
 from ccr_gym.rendering import onto_surface, surface_axes
 from solver import Equilibrium, HalfPlane
@@ -49,8 +50,7 @@ def draw_episodes(episodes: dict[str, tuple[Episode, ...]], path: Path) -> None:
         axis.set_title(
             f"{name}, step {step + 1}: {1e3 * episode.true[step]:.0f} of {1e3 * episode.goal[step]:.0f} mN", fontsize=10
         )
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    _save(figure, path)
 
 
 def draw_scores(summaries: dict[str, dict[str, dict[str, Any]]], out: Path) -> None:
@@ -108,7 +108,8 @@ def _grid(count: int) -> tuple[Any, list[Axes]]:
 
 
 def _save(figure: Any, path: Path) -> None:
-    figure.savefig(path, dpi=130)
+    with replacing(path) as partial:
+        figure.savefig(partial, dpi=130)
     plt.close(figure)
 
 

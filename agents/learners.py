@@ -46,7 +46,6 @@ def learner(envs: VecNormalize, config: TrainConfig) -> BaseAlgorithm:
         "gamma": settings.gamma,
         "seed": config.seed,
         "device": "cpu",
-        "tensorboard_log": str(config.run),
     }
     if isinstance(settings, SACSettings):
         return SAC(

@@ -11,6 +11,7 @@ from rich.table import Table
 from agents.cards import card
 from agents.config import EvaluateConfig
 from agents.figures import draw_curves, draw_episodes, draw_profiles, draw_scores
+from agents.files import write_text
 from agents.suite import Result, folder_name
 
 NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
@@ -38,23 +39,24 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
     """Write everything into the folder of an evaluation, and print the tables."""
     told = {"episodes": config.episodes, "seed": config.seed, "split": "test"}
     report = told | {"results": [result.as_dict() for result in results]}
-    (config.out / "evaluation.json").write_text(json.dumps(report) + "\n")
+    write_text(config.out / "evaluation.json", json.dumps(report) + "\n")
     first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
-    (config.out / "scores.json").write_text(json.dumps(first) + "\n")
+    write_text(config.out / "scores.json", json.dumps(first) + "\n")
     by_id = group(results)
-    (config.out / "evaluation.md").write_text(f"{matrix(by_id)}\n{markdown(by_id)}")
+    write_text(config.out / "evaluation.md", f"{matrix(by_id)}\n{markdown(by_id)}")
     for result in results:
         if result.trainings:
             folder = config.out / "cards" / result.entry.policy / folder_name(result.entry.env_id)
             folder.mkdir(parents=True, exist_ok=True)
-            (folder / "README.md").write_text(card(result, by_id[result.entry.env_id], config))
+            write_text(folder / "README.md", card(result, by_id[result.entry.env_id], config))
     for env_id, here in by_id.items():
         draw_episodes({r.entry.policy: r.shown for r in here}, config.out / f"{folder_name(env_id)}.png")
     draw_scores({env_id: {r.entry.policy: r.summary for r in here} for env_id, here in by_id.items()}, config.out)
     draw_profiles(
         {env_id: {r.entry.policy: r.rmse.ravel() for r in here} for env_id, here in by_id.items()}, config.out
     )
-    draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
+    if any(result.trainings for result in results):
+        draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
     show(by_id)
 
 

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 
 from agents import paper
 from agents.figures import draw_shape
+from agents.files import replacing, write_text
 from solver import Equilibrium, Robot, Scene, Solver
 from solver.forces import VirtualWork
 from solver.free import fitted_slopes, free_nodes, tip_slopes
@@ -153,7 +154,8 @@ def draw(path: Path) -> None:
     _draw_contact_points(axes[7])
     _draw_errors(axes[8])
     _draw_space(figure.add_subplot(2, 5, 10, projection="3d"))
-    figure.savefig(path, dpi=100)
+    with replacing(path) as partial:
+        figure.savefig(partial, dpi=100)
     plt.close(figure)
 
 
@@ -231,5 +233,5 @@ def reproduce(folder: Path) -> list[Claim]:
     folder.mkdir(parents=True, exist_ok=True)
     found = claims()
     draw(folder / "paper.png")
-    (folder / "paper.json").write_text(json.dumps([asdict(claim) for claim in found], indent=2) + "\n")
+    write_text(folder / "paper.json", json.dumps([asdict(claim) for claim in found], indent=2) + "\n")
     return found

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 from rich.progress import track
 
-from agents.actor import ACTOR
+from agents.actor import ACTOR, SUFFIX
 from agents.config import RetrainConfig, TrainConfig
+from agents.files import replacing
 from agents.suite import folder_name
-from agents.training import refuse_another, train
+from agents.training import is_finished, train
 from agents.tuned import LEARNERS
 from agents.workers import workers
 
@@ -35,15 +36,14 @@ def retrain(config: RetrainConfig) -> None:
     """Train what is not trained yet, and put the actors where :mod:`agents.suite` finds shipped ones, in ``out``.
 
     Raises:
-        ValueError: If a run is there with other settings; all are left as they are.
+        UserError: If a run is there with other settings; all are left as they are.
     """
     asked = runs(config)
-    for run in asked:
-        refuse_another(run)
-    missing = [run for run in asked if not (run.run / ACTOR).is_file()]
+    missing = [run for run in asked if not is_finished(run)]
     with workers(config.jobs) as pool:
         waiting = [pool.submit(train, run, False) for run in missing]
         for future in track(as_completed(waiting), "retrain", len(waiting)):
             future.result()
     for run in asked:
-        shutil.copy(run.run / ACTOR, run.run.with_suffix(".pt"))
+        with replacing(run.run.with_suffix(SUFFIX)) as partial:
+            shutil.copyfile(run.run / ACTOR, partial)

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from agents.actor import LearnedPolicy, Training
+from agents.actor import SUFFIX, LearnedPolicy, Training
 from agents.config import PRETRAINED, EvaluateConfig
 from agents.controllers import ForceController
+from agents.errors import UserError
 from agents.evaluate import METRICS, Episode, measure, run_episode
 from agents.mpc import PredictiveController
 from agents.newton import NewtonController
@@ -103,16 +104,11 @@ def entries(config: EvaluateConfig) -> list[Entry]:
 
     Raises:
         FileNotFoundError: If a run has no trained policy.
-        ValueError: If a file is something else, or runs were made with different sensing.
+        UserError: If a file is something else, runs were made with different sensing, or there are no trained policies
+            where learners are asked for.
     """
     if not config.runs:
-        return [
-            Entry(policy, env_id, "realistic", files)
-            for env_id in config.env_ids
-            for policy in config.policies
-            for files in [trained(policy, env_id, config.pretrained)]
-            if policy not in LEARNERS or files
-        ]
+        return _without_runs(config)
     found: dict[tuple[str, str], list[Path]] = {}
     sensings: dict[str, Path] = {}
     for run in config.runs:
@@ -122,7 +118,7 @@ def entries(config: EvaluateConfig) -> list[Entry]:
         sensings[trained_as.sensing] = run
     if len(sensings) > 1:
         told = " and ".join(f"{run} with {sensing}" for sensing, run in sensings.items())
-        raise ValueError(f"runs must have the same sensing; {told}. Evaluate them apart")
+        raise UserError(f"runs must have the same sensing; {told}. Evaluate them apart")
     (sensing,) = sensings
     played = [Entry(name, env_id, sensing, tuple(files)) for (env_id, name), files in found.items()]
     for env_id in dict.fromkeys(env_id for env_id, _ in found):
@@ -130,9 +126,24 @@ def entries(config: EvaluateConfig) -> list[Entry]:
     return played
 
 
+def _without_runs(config: EvaluateConfig) -> list[Entry]:
+    played = [
+        Entry(policy, env_id, "realistic", files)
+        for env_id in config.env_ids
+        for policy in config.policies
+        for files in [trained(policy, env_id, config.pretrained)]
+        if policy not in LEARNERS or files
+    ]
+    learners = [policy for policy in config.policies if policy in LEARNERS]
+    if learners and not any(entry.files for entry in played):
+        place = f"{config.pretrained}/{learners[0]}/{folder_name(config.env_ids[0])}/0{SUFFIX}"
+        raise UserError(f"there are no trained policies as {place}; ccr-gym retrain makes them")
+    return played
+
+
 def trained(learner: str, env_id: str, folder: Path = PRETRAINED) -> tuple[Path, ...]:
     """Files of trained policies, in order of their training seeds; by default those that come with the package."""
-    return tuple(sorted((folder / learner / folder_name(env_id)).glob("*.pt")))
+    return tuple(sorted((folder / learner / folder_name(env_id)).glob(f"*{SUFFIX}")))
 
 
 def folder_name(env_id: str) -> str:

@@ -4,10 +4,12 @@ from dataclasses import replace
 from typing import Any
 
 import optuna
+from sqlalchemy.exc import SQLAlchemyError
 
 from agents.actor import LearnedPolicy
 from agents.config import VALIDATION_SEED, SweepConfig, TrainConfig
 from agents.controllers import ForceController
+from agents.errors import UserError
 from agents.evaluate import scores
 from agents.mpc import PredictiveController
 from agents.newton import NewtonController
@@ -17,16 +19,21 @@ from agents.tuned import LEARNERS, DistilledSettings, LearnerSettings, MPCSettin
 
 
 def sweep(config: SweepConfig) -> optuna.Study:
-    """Add trials to a study, which is kept in the folder; the least force error is the best."""
+    """Add trials to a study, which is kept in the folder; the least force error is the best.
+
+    Raises:
+        UserError: If the study cannot be read or written.
+    """
     config.out.mkdir(parents=True, exist_ok=True)
     name = f"{config.what}-{config.env_id.split('/')[-1]}"
-    study = optuna.create_study(
-        study_name=name,
-        storage=f"sqlite:///{config.out / name}.db",
-        load_if_exists=True,
-    )
-    study.sampler = optuna.samplers.TPESampler(seed=len(study.trials))
-    study.optimize(lambda trial: _score(trial, config), config.trials, show_progress_bar=True)
+    path = config.out / f"{name}.db"
+    try:
+        study = optuna.create_study(study_name=name, storage=f"sqlite:///{path}", load_if_exists=True)
+        study.sampler = optuna.samplers.TPESampler(seed=len(study.trials))
+        study.optimize(lambda trial: _score(trial, config), config.trials, show_progress_bar=True)
+    except (SQLAlchemyError, optuna.exceptions.StorageInternalError) as error:
+        cause = error.__cause__ or error
+        raise UserError(f"{path} is no study that can be gone on with: {cause.args[0]}") from error
     return study
 
 

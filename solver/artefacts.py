@@ -4,6 +4,7 @@ import contextlib
 import functools
 import hashlib
 import os
+import stat
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -11,6 +12,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import platformdirs
+
+PRIVATE = 0o700
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 class StoreStatistics(NamedTuple):
@@ -26,11 +30,12 @@ class ArtefactStore:
     """Files that take long to build, shared by runs and processes.
 
     An entry is named ``key.digest.suffix`` after the SHA-256 of its content and appears by one rename. So a damaged
-    entry is never trusted, and processes that build the same one do not disturb each other.
+    entry is never trusted, and processes that build the same one do not disturb each other. Entries are loaded as code:
+    folder and entries must be the user's own, and nobody else may write to them or to a folder above.
 
     Args:
         folder: Where to keep them; ``None`` stands for ``$CCR_GYM_CACHE`` or else the user's cache folder. Where it
-            cannot be written, a temporary folder takes its place, with a warning.
+            cannot be written, or others may write to it, a temporary folder takes its place, with a warning.
         capacity: Bound on their size [bytes]; the least recently used go first.
     """
 
@@ -47,6 +52,7 @@ class ArtefactStore:
             build: Writes the artefact to the path it is given.
             suffix: File suffix with its dot.
         """
+        self._leave_if_open_to_others()
         found = list(self._folder.glob(f"{key}.*{suffix}"))
         sound = next(filter(_is_sound, found), None)
         if sound:
@@ -69,22 +75,32 @@ class ArtefactStore:
 
     def _publish(self, key: str, build: Callable[[Path], None], suffix: str) -> Path:
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            _make_private(self._folder)
             workspace = tempfile.TemporaryDirectory(dir=self._folder, prefix=".building-")
         except OSError as error:
-            warnings.warn(
-                f"{self._folder} cannot be written ({error.strerror}): what is built is lost with this process; "
-                "set CCR_GYM_CACHE to a writable folder",
-                stacklevel=4,
-            )
-            self._folder = _process_folder()
+            self._leave(f"cannot be written ({error.strerror})", "a writable folder")
             workspace = tempfile.TemporaryDirectory(dir=self._folder, prefix=".building-")
         with workspace as folder:
             fresh = Path(folder, f"fresh{suffix}")
             build(fresh)
+            fresh.chmod(PRIVATE)
             entry = self._folder / f"{key}.{_digest(fresh)}{suffix}"
             os.replace(fresh, entry)
         return entry
+
+    def _leave_if_open_to_others(self) -> None:
+        place = self._folder.resolve()
+        if place.exists() and not _is_private(place):
+            self._leave(f"is not the user's alone (owner {place.stat().st_uid})", "a folder that is, with mode 700")
+        elif shared := [str(above) for above in place.parents if above.exists() and not _is_safe_above(above)]:
+            self._leave(f"is below {shared[0]}, which others may write to", "another folder")
+
+    def _leave(self, why: str, instead: str) -> None:
+        warnings.warn(
+            f"{self._folder} {why}: what is built is lost with this process; set CCR_GYM_CACHE to {instead}",
+            stacklevel=5,
+        )
+        self._folder = _process_folder()
 
     def _entries(self) -> list[tuple[Path, int, int]]:
         """(path, size, time of last use) of each."""
@@ -126,9 +142,28 @@ def _digest(path: Path) -> str:
 
 def _is_sound(entry: Path) -> bool:
     try:
-        return _digest(entry) == entry.name.split(".")[1]
+        return _is_private(entry) and _digest(entry) == entry.name.split(".")[1]
     except OSError:
         return False
+
+
+def _make_private(folder: Path) -> None:
+    """Make a folder and what is missing above it, whatever the umask allows others."""
+    for missing in reversed([path for path in (folder, *folder.parents) if not path.exists()]):
+        missing.mkdir(PRIVATE, exist_ok=True)
+
+
+def _is_private(path: Path) -> bool:
+    """Whether a file or a folder is the user's, and nobody else may write to it."""
+    found = path.lstat()
+    return found.st_uid == os.geteuid() and not found.st_mode & OTHERS_WRITE and not stat.S_ISLNK(found.st_mode)
+
+
+def _is_safe_above(folder: Path) -> bool:
+    """Whether nobody but the user and the owner of the machine can put something else in the place of what it holds."""
+    found = folder.stat()
+    sticky = found.st_mode & stat.S_ISVTX
+    return found.st_uid in (os.geteuid(), os.stat("/").st_uid) and bool(sticky or not found.st_mode & OTHERS_WRITE)
 
 
 def _remove(path: Path) -> None:

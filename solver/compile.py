@@ -28,13 +28,13 @@ def law_address(law: GapLaw) -> int:
     """Address of a compiled gap law, ``int law(const double**, double**, int*, double*, int)``, valid for good.
 
     Raises:
-        RuntimeError: If there is no C compiler, or it fails.
+        RuntimeError: If there is no C compiler, it fails, or what it makes cannot be loaded.
     """
     source = _source(gap_function(law))
     compiler = _compiler()
     version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
     key = artefact_key(source, ca.CasadiMeta.version(), shlex.join(compiler), version, " ".join(FLAGS))
-    library = ctypes.CDLL(str(store().path(key, lambda path: _compile(compiler, source, path), ".so")))
+    library = _load(store().path(key, lambda path: _compile(compiler, source, path), ".so"))
     _LIBRARIES.append(library)
     address = ctypes.cast(getattr(library, f"ccr_{law.kind}_gap"), ctypes.c_void_p).value
     assert address is not None
@@ -44,6 +44,16 @@ def law_address(law: GapLaw) -> int:
 _LIBRARIES: list[ctypes.CDLL] = []  # stay loaded
 
 
+def _load(path: Path) -> ctypes.CDLL:
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise RuntimeError(
+            f"a compiled shape cannot be loaded ({error}); where the folder is mounted noexec, set CCR_GYM_CACHE to "
+            "another, or use ReferenceSolver, which compiles nothing"
+        ) from error
+
+
 def _source(function: ca.Function) -> str:
     generator = ca.CodeGenerator("law", {"casadi_int": "int"})
     generator.add(function)
@@ -51,14 +61,22 @@ def _source(function: ca.Function) -> str:
 
 
 def _compiler() -> list[str]:
-    candidates = [os.environ["CC"]] if "CC" in os.environ else COMPILERS
-    for command in map(shlex.split, candidates):
+    chosen = os.environ.get("CC", "").strip()
+    candidates = [chosen] if chosen else COMPILERS
+    for command in map(_words, candidates):
         if shutil.which(command[0]):
             return command
     raise RuntimeError(
         f"{' or '.join(candidates)} is not there, and a shape given as an expression is compiled for the solver; "
         "install a C compiler or set CC to one, or use ReferenceSolver, which needs none"
     )
+
+
+def _words(command: str) -> list[str]:
+    try:
+        return shlex.split(command)
+    except ValueError:  # quotes that do not close
+        return [command]
 
 
 def _compile(compiler: list[str], source: str, path: Path) -> None:

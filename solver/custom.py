@@ -1,9 +1,10 @@
 """Obstacles of any smooth shape, given as a CasADi expression."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,16 @@ from solver.formulation import GapLaw, gap_function
 from solver.obstacles import SHARPEST, Extent, Obstacle, directions
 from solver.validation import Pair, Point, finite, instance, sequence, shown, unit, whole
 
+UNARY = (
+    *("NEG", "EXP", "LOG", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "NOT", "FLOOR", "CEIL"),
+    *("FABS", "SIGN", "ERF", "INV", "SINH", "COSH", "TANH", "ASINH", "ACOSH", "ATANH", "ERFINV", "LOG1P", "EXPM1"),
+)
+BINARY = (
+    *("ADD", "SUB", "MUL", "DIV", "POW", "CONSTPOW", "LT", "LE", "EQ", "NE", "AND", "OR", "FMOD", "COPYSIGN"),
+    *("IF_ELSE_ZERO", "FMIN", "FMAX", "ATAN2", "HYPOT", "REMAINDER"),
+)
+OPERATIONS = {name: getattr(ca, f"OP_{name}") for name in (*UNARY, *BINARY, "CONST", "INPUT", "OUTPUT")}
+NAMES = {operation: name for name, operation in OPERATIONS.items()}
 PLACE_SIZE = 5  # numbers of a shape before its sizes: centre, axis, growth
 BISECTIONS = 60
 RAY_SAMPLES = 32  # of the function and of the largest disc inside, from the centre to the outline, and on to the reach
@@ -25,11 +36,20 @@ SMOOTH = "give a function that is smooth there, such as a distance, with a slope
 class Family:
     """Shapes ``F(point, sizes) < 0``, traced once; families of the same expression are equal.
 
+    The text lists elementary operations and nothing else, unlike CasADi's own serialisation, which loads the libraries
+    it names: a family that comes from elsewhere cannot run code.
+
     Attributes:
-        text: The function as CasADi writes it.
+        text: The number of sizes and the operations, as :meth:`trace` writes them.
+
+    Raises:
+        ValueError: If the text is something else.
     """
 
     text: str
+
+    def __post_init__(self) -> None:
+        _rebuilt(self.text)
 
     @classmethod
     def trace(cls, function: Callable[[ca.SX, ca.SX], ca.SX], sizes: int = 0) -> Self:
@@ -41,7 +61,8 @@ class Family:
             sizes: How many numbers tell a shape of the family from the others.
 
         Raises:
-            ValueError: If ``sizes`` is out of range, or the function does not return one expression.
+            ValueError: If ``sizes`` is out of range, or the function does not return one expression made of elementary
+                operations.
             TypeError: If ``function`` is none.
         """
         if not callable(function):
@@ -49,17 +70,19 @@ class Family:
         sizes = whole("sizes", sizes, 0, SHAPE_SIZE - PLACE_SIZE)
         point, values = ca.SX.sym("point", 2), ca.SX.sym("sizes", sizes)
         try:
-            traced = function(point, values)
+            returned = function(point, values)
         except (RuntimeError, NotImplementedError) as error:  # of CasADi
             raise ValueError(f"function is not one of CasADi symbols of a point and {sizes} sizes: {error}") from error
-        if not (isinstance(traced, ca.SX) and traced.is_scalar()):
-            raise ValueError(f"function returned {shown(traced)}; it must return one CasADi expression of the point")
-        return cls(ca.Function("family", [point, values], [traced]).serialize())
+        if not (isinstance(returned, ca.SX) and returned.is_scalar() and returned.nnz() == 1):
+            raise ValueError(f"function returned {shown(returned)}; it must return one CasADi expression of the point")
+        traced = ca.Function("family", [point, values], [returned])
+        steps = [_step(traced, k) for k in range(traced.n_instructions())]
+        return cls(json.dumps({"sizes": sizes, "steps": steps}))
 
     @property
     def function(self) -> ca.Function:
         """``(point, sizes) → F``."""
-        return _deserialized(self.text)
+        return _rebuilt(self.text)
 
     def __call__(self, point: ca.SX, shape: ca.SX) -> ca.SX:
         """Gap to ``shape = (x, y, ux, uy, growth, *sizes)``, turned from x to u: ``F / |∇F|`` less the growth."""
@@ -69,9 +92,44 @@ class Family:
         return value / ca.norm_2(ca.gradient(value, point)) - shape[4]
 
 
+def _step(function: ca.Function, k: int) -> list[Any]:
+    """An instruction as ``[name, result, *arguments]``; places of an input, a constant and the output take its form."""
+    name = NAMES.get(function.instruction_id(k))
+    if name is None:
+        raise ValueError(
+            "the function of a family calls another one; it must be made of CasADi's elementary operations"
+        )
+    if name == "CONST":
+        return [name, *function.instruction_output(k), function.instruction_constant(k)]
+    if name == "OUTPUT":
+        return [name, *function.instruction_input(k)]
+    return [name, *function.instruction_output(k), *function.instruction_input(k)]
+
+
 @lru_cache(maxsize=64)
-def _deserialized(text: str) -> ca.Function:
-    return ca.Function.deserialize(text)
+def _rebuilt(text: str) -> ca.Function:
+    """The function of a family's text; nothing but elementary operations is ever made of it."""
+    try:
+        read = json.loads(text)
+        if not 0 <= read["sizes"] <= SHAPE_SIZE - PLACE_SIZE:
+            raise ValueError("it has too many sizes")
+        inputs = ca.SX.sym("point", 2), ca.SX.sym("sizes", read["sizes"])
+        work: dict[int, ca.SX] = {}
+        for name, place, *arguments in read["steps"]:
+            if name == "INPUT":
+                which, index = arguments
+                work[place] = inputs[which][index]
+            elif name == "CONST":
+                work[place] = ca.SX(*map(float, arguments))
+            elif name in UNARY:
+                work[place] = ca.SX.unary(OPERATIONS[name], *(work[k] for k in arguments))
+            elif name in BINARY:
+                work[place] = ca.SX.binary(OPERATIONS[name], *(work[k] for k in arguments))
+            elif name == "OUTPUT":
+                return ca.Function("family", [*inputs], [work[place]])
+        raise ValueError("it has no output")
+    except (ValueError, TypeError, LookupError, AttributeError, NotImplementedError, RuntimeError) as error:
+        raise ValueError(f"text is {text!r:.40}…, no list of operations; families are made by Family.trace") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,10 +8,13 @@ from rich.table import Table
 
 from agents.bench import kernel, peers, space, throughput
 from agents.config import BenchConfig
+from agents.files import write_text
 
 
 def bench(config: BenchConfig) -> dict[str, Any]:
     """Measure, print and, where it is asked for, write."""
+    if config.json is not None:
+        config.json.parent.mkdir(parents=True, exist_ok=True)
     found = {
         "kernel": kernel.measure(config.steps, config.rivals),
         "kernel_in_space": space.measure(config.steps),
@@ -22,8 +25,7 @@ def bench(config: BenchConfig) -> dict[str, Any]:
     for name, part in found.items():
         show(name, part)
     if config.json is not None:
-        config.json.parent.mkdir(parents=True, exist_ok=True)
-        config.json.write_text(json.dumps(found, indent=2) + "\n")
+        write_text(config.json, json.dumps(found, indent=2) + "\n")
     return found
 
 

@@ -1,3 +1,4 @@
+import itertools
 import json
 import sys
 from dataclasses import replace
@@ -6,20 +7,23 @@ from pathlib import Path
 import numpy as np
 import optuna
 import pytest
+import torch
 
 from agents import cli, report, suite, training
-from agents.actor import LearnedPolicy
+from agents.actor import ACTOR, SUFFIX, LearnedPolicy
 from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
 from agents.evaluate import METRICS, Episode, measure, scores
 from agents.retrain import retrain
 from agents.suite import Entry, play, trained
 from agents.sweep import sweep
+from agents.tensors import read_tensors, write_tensors
 from agents.training import train
 from agents.tuned import LEARNERS, PPOSettings
 from ccr_gym import ENV_IDS
 from solver import Status
 
 SCORES = json.loads((PRETRAINED / "scores.json").read_text())
+SCENES = 12  # of the table that are played again
 SMALL = PPOSettings(steps=512, envs=4, rollout=32, batch_size=64, epochs=1, width=8)
 
 
@@ -92,11 +96,11 @@ def test_retraining_fills_a_folder_as_that_of_the_shipped_policies(tmp_path):
     config = RetrainConfig(out=tmp_path, learners=("PPO",), env_ids=("CCR/LoadCell-v0",), seeds=2, share=1e-6, jobs=1)
     retrain(config)
     files = trained("PPO", "CCR/LoadCell-v0", tmp_path)
-    assert [file.name for file in files] == ["0.pt", "1.pt"]
+    assert [file.name for file in files] == ["0.safetensors", "1.safetensors"]
     assert [LearnedPolicy(file).training.config.seed for file in files] == [0, 1000]
-    before = [file.stat().st_mtime_ns for file in tmp_path.glob("PPO/LoadCell-v0/*/actor.pt")]
+    before = [file.stat().st_mtime_ns for file in tmp_path.glob(f"PPO/LoadCell-v0/*/{ACTOR}")]
     retrain(config)
-    assert [file.stat().st_mtime_ns for file in tmp_path.glob("PPO/LoadCell-v0/*/actor.pt")] == before
+    assert [file.stat().st_mtime_ns for file in tmp_path.glob(f"PPO/LoadCell-v0/*/{ACTOR}")] == before
     with pytest.raises(ValueError, match="a run with other settings"):
         retrain(replace(config, share=1.0))
 
@@ -135,22 +139,28 @@ def test_a_sweep_finds_settings_of_every_learner(learner, tmp_path, monkeypatch)
         ("evaluate", "--seed", "5"),
         ("retrain", "--share", "0"),
         ("sweep", "--env-id", "CCR/Nope-v0"),
+        ("train", "--env-id", "Pendulum-v1"),
+        ("train", "--env-id", "nope"),
+        ("train", "--threads", "0"),
+        ("train", "ppo", "--learning-rate", "nan"),
+        ("train", "ppo", "--gamma", "2"),
+        ("train", "ppo", "--batch-size", "1"),
+        ("train", "sac", "--tau", "-1"),
+        ("train", "sarsa"),
+        ("bench", "--steps", "0"),
+        ("bench", "--steps", "150"),
+        ("bench", "--seeds", "0"),
     ],
 )
-def test_the_command_line_exits_before_any_work(arguments, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
-    with pytest.raises(SystemExit):
-        cli.main()
-    written = capsys.readouterr()
-    assert any(word in written.out + written.err for word in ("at least", "must name", "must be above"))
-
-
-@pytest.mark.parametrize("arguments", [("train", "--env-id", "CCR/Nope-v0"), ("evaluate", "--runs", "nowhere")])
-def test_what_is_missing_is_named(arguments, tmp_path, monkeypatch):
+def test_the_command_line_exits_before_any_work(arguments, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
-    with pytest.raises(SystemExit, match=r"Nope|train first"):
+    with pytest.raises(SystemExit, match="2"):
         cli.main()
+    words = ("at least", "must name", "must be above", "must be from", "sarsa")
+    written = " ".join(capsys.readouterr().err.split())
+    assert any(word in written for word in words)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_runs_of_different_sensing_are_not_compared(run, tmp_path):
@@ -168,20 +178,53 @@ def test_names_of_policies_and_environments_are_checked():
         SweepConfig(trials=0)
 
 
-@pytest.mark.parametrize("file", sorted(PRETRAINED.rglob("*.pt")), ids=str)
+@pytest.mark.parametrize("file", sorted(PRETRAINED.rglob(f"*{SUFFIX}")), ids=str)
 def test_shipped_policies_load_and_are_of_their_environment(file):
     policy = LearnedPolicy(file)
     assert file in trained(policy.name, policy.training.config.env_id)
     assert policy.training.config.sensing == "realistic"
 
 
+def agrees(found, told):
+    """Whether at least a third of some scenes' errors are those of the table, to 1 %.
+
+    In single precision another processor rounds differently. Most scenes do not care, but where a closed loop is on the
+    edge, as at a switch of the memory, it amplifies the last bit, up to twice the error: five of twelve scenes of one
+    policy, none of most. Errors of another policy agree by chance, at most one of twelve.
+    """
+    return np.mean(np.abs(found - told) <= 0.01 * np.abs(told) + 2e-3) >= 1 / 3
+
+
+def first_scores(file, env_id):
+    return scores(LearnedPolicy(file), env_id, EVALUATION_SEED, SCENES, sensing="realistic", split="test")
+
+
 @pytest.mark.parametrize("name", sorted(SCORES))
 def test_shipped_policies_give_the_numbers_of_the_table(name):
     """``scores.json`` is what ``ccr-gym evaluate`` wrote of their first test scenes."""
     policy, env_id = name.split()
-    (file,) = trained(policy, env_id)
-    found = scores(LearnedPolicy(file), env_id, EVALUATION_SEED, 2, sensing="realistic", split="test")
-    assert found == pytest.approx(SCORES[name][:2], rel=0.01, abs=0.02)
+    assert agrees(first_scores(*trained(policy, env_id), env_id), np.array(SCORES[name][:SCENES]))
+
+
+@pytest.mark.parametrize("env_id", sorted(ENV_IDS))
+def test_no_policy_gives_the_numbers_of_another(env_id):
+    table = {learner: np.array(SCORES[f"{learner} {env_id}"][:SCENES]) for learner in LEARNERS}
+    for found, told in itertools.permutations(table, 2):
+        assert not agrees(table[found], table[told]), (found, told)
+
+
+@pytest.mark.parametrize("noise", [0.02, None], ids=["other weights", "untrained"])
+def test_other_weights_do_not_give_the_numbers_of_the_table(noise, tmp_path):
+    env_id = "CCR/LoadCell-v0"
+    tensors, values = read_tensors(trained("PPO", env_id)[0])
+    torch.manual_seed(0)
+    for name, weight in tensors.items():
+        if name.startswith("weights"):
+            spread = 0.1 if noise is None else noise * weight.float().abs().mean()
+            tensors[name] = (torch.zeros_like(weight) if noise is None else weight) + spread * torch.randn(weight.shape)
+    write_tensors(tmp_path / f"0{SUFFIX}", tensors, values)
+    found = first_scores(tmp_path / f"0{SUFFIX}", env_id)
+    assert not agrees(found, np.array(SCORES[f"PPO {env_id}"][:SCENES]))
 
 
 def test_policies_of_every_learner_come_for_every_environment():
@@ -189,4 +232,4 @@ def test_policies_of_every_learner_come_for_every_environment():
 
 
 def test_shipped_policies_are_small():
-    assert sum(file.stat().st_size for file in PRETRAINED.rglob("*.pt")) < 2_000_000
+    assert sum(file.stat().st_size for file in PRETRAINED.rglob(f"*{SUFFIX}")) < 2_000_000

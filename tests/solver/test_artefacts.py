@@ -1,10 +1,13 @@
 """The store of compiled functions: sound, bounded, shared."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from solver import artefacts
 from solver.artefacts import ArtefactStore, artefact_key
 
 KEY = artefact_key("formulation", "casadi", "cc")
@@ -90,3 +93,69 @@ def test_processes_build_at_once(tmp_path):
     processes = [subprocess.Popen([sys.executable, "-c", PROCESS, str(tmp_path)]) for _ in range(3)]
     assert [process.wait(60) for process in processes] == [0, 0, 0]
     assert len(list(tmp_path.iterdir())) == 3
+
+
+@pytest.fixture
+def planted(tmp_path):
+    """A folder with an artefact that was put there under its right name, and a file of that name."""
+    folder = tmp_path / "shared" / "store"
+    entry = ArtefactStore(folder).path(KEY, write("planted"), ".so")
+    return folder, entry
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
+@pytest.mark.parametrize("shared", ["folder", "above"])
+def test_a_folder_that_others_may_write_to_is_not_trusted(planted, shared, mode):
+    folder, entry = planted
+    (folder if shared == "folder" else folder.parent).chmod(mode)
+    store = ArtefactStore(folder)
+    with pytest.warns(UserWarning, match="set CCR_GYM_CACHE to"):
+        built = store.path(artefact_key("another", shared, oct(mode)), write("built"), ".so")
+    assert folder not in built.parents
+    assert store.path(KEY + shared + oct(mode), write("law"), ".so").read_text() == "law"
+    assert entry.read_text() == "planted"
+
+
+def test_the_sticky_bit_keeps_others_from_putting_something_else_there(planted):
+    folder, entry = planted
+    folder.parent.chmod(0o1777)
+    assert ArtefactStore(folder).path(KEY, refuse, ".so") == entry
+
+
+@pytest.mark.parametrize("whose", ["folder", "above"])
+def test_a_folder_of_somebody_else_is_not_trusted(planted, whose, monkeypatch):
+    folder, _ = planted
+    lent = folder if whose == "folder" else folder.parent
+    real = Path.stat if whose == "above" else Path.lstat
+
+    def of_another(path, **options):
+        found = real(path, **options)
+        return os.stat_result((*found[:4], found.st_uid + 1234, *found[5:])) if path == lent else found
+
+    monkeypatch.setattr(artefacts.Path, real.__name__, of_another)
+    with pytest.warns(UserWarning, match="set CCR_GYM_CACHE to"):
+        ArtefactStore(folder).path(artefact_key("of", whose), write("law"), ".so")
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o770, 0o606])
+def test_an_artefact_that_others_may_write_to_is_rebuilt(planted, mode):
+    folder, entry = planted
+    entry.chmod(mode)
+    assert ArtefactStore(folder).path(KEY, write("law"), ".so").read_text() == "law"
+
+
+def test_a_link_is_no_artefact(planted, tmp_path):
+    folder, entry = planted
+    entry.replace(tmp_path / "elsewhere")
+    entry.symlink_to(tmp_path / "elsewhere")
+    assert ArtefactStore(folder).path(KEY, write("law"), ".so").read_text() == "law"
+
+
+def test_nothing_is_open_to_others_whatever_the_umask(tmp_path):
+    before = os.umask(0)
+    try:
+        entry = ArtefactStore(tmp_path / "new" / "store").path(KEY, write("law"), ".so")
+    finally:
+        os.umask(before)
+    assert [path.stat().st_mode & 0o777 for path in (entry, *entry.parents[:2])] == [0o700] * 3
+    assert ArtefactStore(tmp_path / "new" / "store").path(KEY, refuse, ".so") == entry

@@ -1,6 +1,7 @@
 """Shapes given as expressions: a custom ellipse is the ellipse, and a new shape is as exact as any."""
 
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -74,6 +75,32 @@ def test_a_compiler_that_fails_is_named(monkeypatch):
         )
 
 
+@pytest.mark.parametrize("command", ["", "  "])
+def test_an_empty_name_of_a_compiler_is_none(monkeypatch, command):
+    monkeypatch.setenv("CC", command)
+    Solver(Robot.prototype(), Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + 3 * p[1] ** 2 - 90), sizes=())]))
+
+
+def test_quotes_that_do_not_close_are_no_compiler(monkeypatch):
+    monkeypatch.setenv("CC", "gcc '")
+    with pytest.raises(RuntimeError, match="gcc ' is not there"):
+        Solver(Robot.prototype(), Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + p[1] ** 2 - 91), sizes=())]))
+
+
+NOEXEC = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
+
+
+def test_a_folder_that_nothing_runs_from_is_named(tmp_path):
+    run = (
+        f"mount -t tmpfs -o noexec,mode=700 none {tmp_path} && CCR_GYM_CACHE={tmp_path}/cache exec {sys.executable} -c"
+    )
+    if subprocess.run([*NOEXEC, f"mount -t tmpfs none {tmp_path}"], capture_output=True).returncode:
+        pytest.skip("needs mounts of its own")
+    done = subprocess.run([*NOEXEC, f"{run} '{SOLVE}'"], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "a compiled shape cannot be loaded" in done.stderr.splitlines()[-1]
+
+
 def test_outline():
     shape = egg()
     outline = shape.outline()
@@ -131,6 +158,68 @@ def test_families_of_one_expression_share_a_library():
 def test_bad_shapes_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         egg(**change)
+
+
+LIBRARY = """
+#include <stdio.h>
+__attribute__((constructor)) static void loaded(void) { fclose(fopen("WITNESS", "w")); }
+static const long long scalar[] = {1, 1, 0, 1, 0}, point[] = {2, 1, 0, 2, 0, 1}, none[] = {0, 1, 0, 0};
+int planted(const double** a, double** r, long long* i, double* w, int m) { r[0][0] = a[0][0] - 1; return 0; }
+long long planted_n_in(void) { return 2; }
+long long planted_n_out(void) { return 1; }
+const long long* planted_sparsity_in(long long i) { return i ? none : point; }
+const long long* planted_sparsity_out(long long i) { return scalar; }
+int planted_work(long long* a, long long* r, long long* i, long long* w) { *a = 2; *r = 1; *i = *w = 0; return 0; }
+"""
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+def test_a_family_from_elsewhere_loads_no_library(tmp_path):
+    """CasADi's own text of a function names a library, which deserialising it loads."""
+    witness, library = tmp_path / "loaded", tmp_path / "planted.so"
+    (tmp_path / "planted.c").write_text(LIBRARY.replace("WITNESS", str(witness)))
+    subprocess.run(["cc", "-shared", "-fPIC", str(tmp_path / "planted.c"), "-o", str(library)], check=True)
+    external = "import casadi, sys; print(casadi.external('planted', sys.argv[1]).serialize(), end='')"
+    told = subprocess.run([sys.executable, "-c", external, str(library)], capture_output=True, text=True, check=True)
+    witness.unlink()
+    refused = "import sys; from solver import Family; Family(sys.argv[1]).function"
+    run = subprocess.run([sys.executable, "-c", refused, told.stdout], capture_output=True, text=True)
+    assert "families are made by Family.trace" in run.stderr
+    assert not witness.exists()
+
+
+def test_a_family_is_rebuilt_from_its_text():
+    def function(point, sizes):
+        bent = ca.if_else(point[0] > 1, point[1], sizes[0]) + ca.fmax(point[1], 0.1) ** 2.5
+        return (
+            (point[0] / sizes[0]) ** 2 + bent * ca.sin(sizes[1]) - sizes[0] ** point[1] + ca.atan2(*ca.vertsplit(point))
+        )
+
+    point, sizes = ca.SX.sym("point", 2), ca.SX.sym("sizes", 2)
+    told = ca.Function("told", [point, sizes], [function(point, sizes)])
+    points = np.random.default_rng(0).uniform(-3, 3, (2, 100))
+    again = Family(Family.trace(function, sizes=2).text)
+    ours, theirs = (np.asarray(function(points, [2.0, 0.7])) for function in (again.function, told))
+    assert np.array_equal(ours, theirs, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[" * 100_000,
+        '{"sizes": 0}',
+        '{"sizes": -1, "steps": [["CONST", 0, 1.0], ["OUTPUT", 0]]}',
+        '{"sizes": 1000000000000, "steps": [["CONST", 0, 1.0], ["OUTPUT", 0]]}',
+        '{"sizes": 0, "steps": []}',
+        '{"sizes": 0, "steps": [["INPUT", 0, 0, 2], ["OUTPUT", 0]]}',
+        '{"sizes": 0, "steps": [["CONST", 0, 1.0], ["ADD", 0, 0], ["OUTPUT", 0]]}',
+        '{"sizes": 0, "steps": [["SIN", 0, 1], ["OUTPUT", 0]]}',
+    ],
+)
+def test_a_text_that_is_no_family_is_refused(text):
+    with pytest.raises(ValueError, match="families are made by"):
+        Family(text)
 
 
 def disc(point):
@@ -197,3 +286,12 @@ def test_smooth_shapes_are_taken_however_they_are_scaled(sharpness):
 def test_bad_families_are_refused(call, error, message):
     with pytest.raises(error, match=message):
         call()
+
+
+def test_a_function_that_calls_another_makes_no_family():
+    def function(point, _):
+        inner = ca.SX.sym("inner", 2)
+        return ca.Function("inner", [inner], [inner[0] - 1], {"never_inline": True})(point)
+
+    with pytest.raises(ValueError, match="calls another one"):
+        Family.trace(function)

@@ -1,0 +1,219 @@
+"""What goes wrong outside a command ends in one line and an exit code, and nothing is lost or left half-written."""
+
+import errno
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from agents import checkpoint, cli, commands, training
+from agents.actor import ACTOR, LearnedPolicy
+from agents.config import TrainConfig
+from agents.errors import UserError
+from agents.files import LOCK, PARTIAL, locked, replacing, write_text
+from agents.tuned import PPOSettings
+from agents.workers import workers
+
+SMALL = [
+    "ppo",
+    "--steps",
+    "4096",
+    "--envs",
+    "8",
+    "--rollout",
+    "32",
+    "--batch-size",
+    "64",
+    "--epochs",
+    "1",
+    "--width",
+    "8",
+]
+COMMAND = [sys.executable, "-c", "from agents.cli import main; main()"]
+REGULATED = "/sys/ccr-gym"  # where not even root can make a folder
+
+
+def started(*arguments, **options):
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen([*COMMAND, *map(str, arguments)], **pipes, **options)
+
+
+def ended(process, timeout=60):
+    """Exit code and lines of the error stream."""
+    _, err = process.communicate(timeout=timeout)
+    return process.returncode, err.splitlines()
+
+
+def called(monkeypatch, capsys, *arguments):
+    """The same in this process."""
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *map(str, arguments)])
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    return caught.value.code, capsys.readouterr().err.splitlines()
+
+
+def assert_one_line(code, lines, *words):
+    assert code == cli.WRONG
+    assert len(lines) == 1, lines
+    assert all(word in lines[0] for word in ("ccr-gym: ", *words)), lines
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("evaluate", "--runs", "nowhere"), "nowhere/actor.safetensors is missing; train first"),
+        (("evaluate", "--pretrained", "."), "there are no trained policies"),
+        (("evaluate", "--pretrained", "nowhere"), "there are no trained policies"),
+        (("evaluate", "--policies", "PPO", "--pretrained", "nowhere"), "there are no trained policies"),
+        (("evaluate", "--out", "file", "--policies", "PI"), "file"),
+        (("train", "--run", "file"), "file"),
+        (("train", "--run", "."), "holds file but no config.json"),
+        (("sweep", "--out", "file"), "file"),
+        (("reproduce", "--out", "file"), "file"),
+        (("bench", "--json", "file/bench.json"), "file"),
+        (("retrain", "--out", "file", "--jobs", "1", "--seeds", "1"), "file"),
+    ],
+)
+def test_what_cannot_be_used_is_named(arguments, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("in the way")
+    assert_one_line(*called(monkeypatch, capsys, *arguments), words)
+    assert Path("file").read_text() == "in the way"
+
+
+@pytest.mark.skipif(not Path("/sys").is_dir(), reason="no folder that refuses every user")
+@pytest.mark.parametrize("arguments", ["train --run", "evaluate --out", "sweep --out", "reproduce --out"])
+def test_a_folder_that_cannot_be_written_is_named(arguments, monkeypatch, capsys):
+    assert_one_line(*called(monkeypatch, capsys, *arguments.split(), REGULATED), REGULATED)
+
+
+def test_a_damaged_study_is_named(tmp_path, monkeypatch, capsys):
+    study = tmp_path / "PI-PushObstacle-v0.db"
+    study.write_bytes(b"no data base" * 100)
+    assert_one_line(*called(monkeypatch, capsys, "sweep", "--out", tmp_path, "--trials", 1), str(study))
+
+
+@pytest.mark.parametrize("command", sorted(commands.COMMANDS, key=str))
+def test_a_bug_shows_where_it_is_and_an_interrupt_does_not(command, monkeypatch, capsys):
+    def fail(error):
+        raise error
+
+    name = commands.COMMANDS[command].__name__
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", name])
+    monkeypatch.setitem(commands.COMMANDS, command, lambda _: fail(ValueError("a bug")))
+    with pytest.raises(ValueError, match="a bug"):
+        cli.main()
+    monkeypatch.setitem(commands.COMMANDS, command, lambda _: fail(KeyboardInterrupt()))
+    code, lines = called(monkeypatch, capsys, name)
+    assert (code, len(lines)) == (cli.INTERRUPTED, 1)
+
+
+@pytest.mark.parametrize("name", ["train", "evaluate", "retrain"])
+@pytest.mark.parametrize("seconds", [0.2, 6.0], ids=["loading", "working"])
+def test_an_interrupt_ends_a_command_in_one_line_and_leaves_no_process(name, seconds, tmp_path):
+    """As a terminal does it: the signal goes to all processes of the command."""
+    process = started(name, "--run" if name == "train" else "--out", tmp_path / "out", start_new_session=True)
+    time.sleep(seconds)
+    os.killpg(process.pid, signal.SIGINT)
+    code, lines = ended(process)
+    assert (code, len(lines)) == (cli.INTERRUPTED, 1), lines
+    assert not list(tmp_path.rglob(f"{PARTIAL}*"))
+
+
+def limited(size):
+    """What makes a disk fill for a process: no file may grow beyond some bytes."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+@pytest.mark.parametrize(("size", "file"), [(100, "config.json"), (4000, "checkpoint.safetensors")])
+def test_training_on_a_full_disk_goes_on_when_there_is_space(size, file, tmp_path):
+    run = tmp_path / "run"
+    code, lines = ended(started("train", "--run", run, *SMALL, preexec_fn=limited(size)))
+    assert_one_line(code, lines, f"{run / file} cannot be written: File too large")
+    assert {path.name for path in run.iterdir()} <= {LOCK, "config.json", "log_1"}
+    assert ended(started("train", "--run", run, *SMALL)) == (0, [])
+    assert LearnedPolicy(run).training.curve.returns
+
+
+def test_a_log_that_cannot_be_written_is_named(tmp_path):
+    many = [*SMALL[:5], "--rollout", 8, *SMALL[7:]]
+    code, lines = ended(started("train", "--run", tmp_path, *many, "--steps", 100_000, preexec_fn=limited(40_000)))
+    assert_one_line(code, lines, f"{tmp_path / 'log_1'} cannot be written: File too large")
+
+
+def test_evaluating_on_a_full_disk_leaves_nothing_half_written(tmp_path):
+    arguments = ["--env-ids", "CCR/LoadCell-v0", "--policies", "PI", "P", "--episodes", 8, "--no-video", "--jobs", 1]
+    out = tmp_path / "out"
+    code, lines = ended(started("evaluate", "--out", out, *arguments, preexec_fn=limited(500)))
+    assert_one_line(code, lines[-1:], f"{out / 'evaluation.json'} cannot be written: File too large")
+    assert [path for path in out.rglob("*") if path.is_file()] == []
+
+
+def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
+    path = tmp_path / "file.txt"
+    write_text(path, "before")
+
+    def write_half():
+        with replacing(path) as partial:
+            partial.write_text("half")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(UserError, match=r"file.txt cannot be written: No space left"):
+        write_half()
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_run_that_is_killed_goes_on_from_its_checkpoint(tmp_path):
+    run = tmp_path / "run"
+    process = started("train", "--run", run, *SMALL)
+    until = time.monotonic() + 60
+    while not (run / checkpoint.CHECKPOINT).exists() and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.005)
+    process.kill()
+    process.communicate()
+    config = TrainConfig.load(run / training.CONFIG)
+    kept = checkpoint.Run(config).progress
+    assert kept.steps > 0
+    assert not (run / ACTOR).exists()
+    policy = LearnedPolicy(training.train(config, progress=False))
+    assert policy.training.curve.steps[: len(kept.curve_steps)] == tuple(kept.curve_steps)
+    assert policy.training.seconds > kept.seconds
+
+
+def test_a_lock_ends_with_its_process(tmp_path):
+    code = "import sys, time; from pathlib import Path; from agents.files import locked\n"
+    code += "with locked(Path(sys.argv[1])): print('has it', flush=True); time.sleep(60)"
+    process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "has it\n"
+    with pytest.raises(UserError, match="another process"), locked(tmp_path):
+        pass
+    process.kill()
+    process.communicate()
+    with locked(tmp_path):
+        pass
+
+
+def test_a_finished_run_says_so_and_ends_well(tmp_path, monkeypatch, capsys):
+    run, settings = tmp_path / "run", PPOSettings(steps=512, envs=4, rollout=32, batch_size=64, epochs=1, width=8)
+    training.train(TrainConfig(run=run, learner=settings, threads=1), progress=False)
+    before = (run / ACTOR).stat().st_mtime_ns
+    arguments = [
+        text
+        for name in ("steps", "envs", "rollout", "batch_size", "epochs", "width")
+        for text in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))
+    ]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", "train", "--run", str(run), "ppo", *arguments])
+    cli.main()
+    assert "is finished already; --restart trains it anew" in capsys.readouterr().out
+    assert (run / ACTOR).stat().st_mtime_ns == before
+
+
+def test_a_worker_that_dies_is_told_of():
+    with pytest.raises(UserError, match="a worker process was killed"), workers(1) as pool:
+        pool.submit(os._exit, 1).result()
