@@ -344,12 +344,15 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   if (!attempt_free()) {
     if (!Model::kSliding && pull(command.cables) <= 0) return Move::kRejected;
     predict();
-    const Verdict verdict = newton_.solve(trial_);
+    const bool patient = apart(present_.command, command) <= kPatientStep;
+    const Verdict verdict = newton_.solve(trial_, patient ? kDampedIterations : 0);
     iterations += verdict.iterations;
     if (!verdict.converged) return Move::kRejected;
   }
   const double moved = farthest(), length = newton_.chain.robot().max_length, size = apart(present_.command, command);
-  if (moved > length * std::min(kMoveOffset + kMoveSlope * size, kMoveLargest) || !passable(moved)) return Move::kRejected;
+  const bool contact = newton_.chain.touching(trial_.active) || newton_.chain.touching(present_.active);
+  const double allowed = contact ? std::min(kMoveOffset + kMoveSlope * size, kMoveLargest) : kMoveLargest;
+  if (moved > length * allowed || !passable(moved)) return Move::kRejected;
   newton_.chain.reduced_gradient(trial_.active);
   trial_tensions_ = newton_.chain.tensions(trial_.active);
   if (jumped(command, moved)) return Move::kRejected;
@@ -408,7 +411,7 @@ template <class Model>
 bool Branch<Model>::returns() {
   back_ = trial_;
   back_.command = present_.command;
-  const Verdict verdict = newton_.solve(back_);
+  const Verdict verdict = newton_.solve(back_, 0);
   iterations += verdict.iterations;
   double apart = verdict.converged ? 0 : HUGE_VAL, moved = 0;
   for (std::size_t i = 0; i < back_.controls.size(); ++i)
@@ -472,7 +475,7 @@ bool Branch<Model>::finish() {
   const double energy = newton_.chain.energy();
   trial_ = present_;
   newton_.chain.fence(false);
-  const Verdict verdict = newton_.solve(trial_);
+  const Verdict verdict = newton_.solve(trial_, 0);
   newton_.chain.fence(true);
   iterations += verdict.iterations;
   if (!verdict.converged || newton_.chain.energy() > energy || !close_by()) return false;

@@ -56,8 +56,12 @@ bool Newton<Model>::convex(const ActiveSet& active, int penalties) {
 
 // Else damping, which only shortens the way there; tried from a little less than what was needed last.
 template <class Model>
-bool Newton<Model>::convexify(const ActiveSet& active) {
-  if (convex(active, kDescentPenalties)) return true;
+bool Newton<Model>::convexify(const ActiveSet& active, int penalties) {
+  return convex(active, penalties) || damp();
+}
+
+template <class Model>
+bool Newton<Model>::damp() {
   damping_ = std::max(kDamping * hessian_.steepest(), needed_ / (kDampingGrowth * kDampingGrowth));
   for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
     if (hessian_.factor(damping_)) {
@@ -136,15 +140,16 @@ double Newton<Model>::search(const Iterate& at, const ActiveSet& target, double&
 }
 
 template <class Model>
-Verdict Newton<Model>::solve(Iterate& at) {
+Verdict Newton<Model>::solve(Iterate& at, int damped) {
   Verdict verdict;
   if (!chain.evaluate(at)) return verdict;
   double weight = 0;
-  bool close = false;
+  bool close = false, stable = true;  // the last curvature along the active gaps
+  needed_ = 0;
   for (; verdict.iterations <= kNewtonIterations; ++verdict.iterations) {
     chain.reduced_gradient(at.active);
     if (equilibrium(at.active)) {
-      verdict.converged = true;
+      verdict.converged = stable || convex(at.active, kPenalties);
       return verdict;
     }
     ActiveSet target = at.active;
@@ -158,7 +163,9 @@ Verdict Newton<Model>::solve(Iterate& at) {
       }
       target = at.active;
     }
-    if (!convex(at.active, kPenalties) || !contacts_.solve(chain, hessian_, target, step_)) return verdict;
+    stable = convex(at.active, kPenalties);
+    if (!stable && (verdict.iterations >= damped || !damp())) return verdict;
+    if (!contacts_.solve(chain, hessian_, target, step_)) return verdict;
 
     size_ = size(step_);
     const double scale = search(at, target, weight);
@@ -175,9 +182,11 @@ Verdict Newton<Model>::solve(Iterate& at) {
 template <class Model>
 bool Newton<Model>::measure(const Iterate& at) {
   needed_ = 0;
+  stretch_ = kStretch;
+  creeping_ = false;
   if (!chain.evaluate(at)) return false;
   chain.reduced_gradient(at.active);
-  return convexify(at.active) && hessian_.factor(damping_ + kMeasureDamping * hessian_.steepest());
+  return convexify(at.active, kDescentPenalties) && hessian_.factor(damping_ + kMeasureDamping * hessian_.steepest());
 }
 
 template <class Model>
@@ -221,7 +230,7 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   if (!chain.evaluate(at)) return verdict;
   chain.reduced_gradient(at.active);
   verdict.converged = equilibrium(at.active) && convex(at.active, kPenalties);
-  if (verdict.converged || !convexify(at.active)) return verdict;
+  if (verdict.converged || !convexify(at.active, creeping_ ? kPenalties : kDescentPenalties)) return verdict;
   ActiveSet target = at.active;
   if (!contacts_.solve(chain, hessian_, target, step_)) return verdict;
   // Energy may rise by what it costs to close gaps that are open by as little as is not told from closed.
@@ -233,10 +242,11 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
   const ActiveSet touching = closed(target);
   // Where the curvature is negative the energy sinks farther along a damped step than that goes.
   const bool stretched = damping_ > 0 && touching.count == target.count;
-  double scale = stretched ? std::min(kStretch, largest / size(step_)) : whole;
+  const double farthest = stretched ? std::min(stretch_, largest / size(step_)) : whole;
+  double scale = farthest;
   // Restorations are measured by closeness: near a fold the energy hardly resists the motion that ends the branch.
   if (!hessian_.factor(damping_ + kMeasureDamping * hessian_.steepest())) return verdict;
-  for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale = scale > whole ? whole : scale / 2) {
+  for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= scale > 2 * whole ? kStretch : 2) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap that is to push
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
@@ -245,6 +255,9 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
     std::swap(at.mounts, trial_.mounts);
     at.active = closed(target);
     moved = true;
+    // Far from where it leads a heavily damped step is too short, near there a penalty that closes gaps costs nothing.
+    creeping_ = scale * size(step_) < kCreep;
+    if (stretched) stretch_ = scale == farthest ? kStretch * scale : std::max(kStretch, scale);
     return verdict;
   }
   return verdict;

@@ -23,8 +23,8 @@ class Newton {
   void enter(std::span<const Obstacle<Model::kSpace>> obstacles);
 
   // Iteration with an l1 merit search: quadratic, for a start close to a stable equilibrium. Gives up where the
-  // curvature along the active gaps is not positive.
-  Verdict solve(Iterate& at);
+  // curvature along the active gaps is not positive, after so many damped iterations.
+  Verdict solve(Iterate& at, int damped);
 
   // One iterate of energy descent from a feasible shape. Returns the verdict on that shape, and where it is not yet an
   // equilibrium moves `at` to a feasible one of no more energy, by a step of at most the size `largest`; `moved` tells
@@ -46,7 +46,8 @@ class Newton {
   ActiveSet closed(const ActiveSet& active) const;
   bool on_surface(const ActiveSet& active, double tolerance) const;
   bool convex(const ActiveSet& active, int penalties);
-  bool convexify(const ActiveSet& active);
+  bool convexify(const ActiveSet& active, int penalties);
+  bool damp();
   double size(const Direction<Model>& step) const;
   double merit(double weight) const;
   double search(const Iterate& at, const ActiveSet& target, double& weight);
@@ -57,7 +58,9 @@ class Newton {
   double size_ = 0;  // of `step_`
   Iterate trial_;
   double damping_ = 0;
-  double needed_ = 0;  // of damping, in the descent that goes on
+  double needed_ = 0;   // of damping, in the descent that goes on
+  double stretch_ = 1;  // of its next damped iterate
+  bool creeping_ = false;  // whether its iterates hardly move
 };
 
 }  // namespace ccr

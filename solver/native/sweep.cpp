@@ -30,11 +30,17 @@ bool quadratic(const Obstacle<D>& obstacle) {
          obstacle.shape == Shape::kSpatialCapsule;
 }
 
+// How far a point is from a closed outline, as of straight pieces.
 template <int D>
 double nearest(const std::vector<Position<D>>& outline, const Position<D>& point) {
-  const double square = lowest(static_cast<int>(outline.size()), [&](int k) {
-    const Position<D> offset = minus(point, outline[k]);
-    return dot(offset, offset);
+  const int count = static_cast<int>(outline.size());
+  const double square = lowest(count, [&](int k) {
+    const Position<D>& start = outline[k];
+    const Position<D> along = minus(outline[k + 1 < count ? k + 1 : 0], start), offset = minus(point, start);
+    const double length = dot(along, along);
+    const double share = length > 0 ? std::clamp(dot(offset, along) / length, 0.0, 1.0) : 0.0;
+    const Position<D> rest = minus(point, lerp(start, outline[k + 1 < count ? k + 1 : 0], share));
+    return dot(rest, rest);
   });
   return std::sqrt(square);
 }
@@ -82,6 +88,7 @@ bool path_clear(const Obstacle<D>& obstacle, const Position<D>& from, const Posi
 template <int D>
 bool edge_clear(const Obstacle<D>& obstacle, const Edge<D>& from, const Edge<D>& to, double half) {
   const double motion = std::max(distance(from.start, to.start), distance(from.end, to.end));
+  if (motion == 0) return true;
   double at = 0;
   for (int stride = 0; stride < kSweepStrides; ++stride) {
     const double t = at / motion;
