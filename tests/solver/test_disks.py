@@ -1,5 +1,6 @@
-"""Disks of the sliding cable's robot that meet: the law of their gap, its multipliers, and the certificate with them."""
+"""Disks that meet where the cable slides: the law of their gap, its multipliers, and the certificate with them."""
 
+import itertools
 import math
 
 import casadi as ca
@@ -126,7 +127,7 @@ def test_a_robot_pulled_on_bends_until_its_disks_meet(radius, thickness, before,
 def test_the_reference_solver_finds_the_same_where_disks_meet(radius, thickness, before, after, most):
     robot, scene = make_robot(radius, thickness), Scene([CIRCLE])
     reference, states = ReferenceSolver(robot, scene), pulled(Solver(robot, scene), most)
-    for state, following in list(zip(states, states[1:], strict=False))[round(2 * before) - 1 :: 2]:
+    for state, following in itertools.islice(itertools.pairwise(states), round(2 * before) - 1, None, 2):
         same = reference.step(state, following.cable_mm)
         assert same.status is Status.CONVERGED
         assert same.nodes == pytest.approx(following.nodes, abs=1e-6)
