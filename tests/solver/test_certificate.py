@@ -48,7 +48,7 @@ def test_residuals_of_every_shape(random_shapes, cable, touch):
     robot, generator = replace(Robot.prototype(), cable=cable, **touch), np.random.default_rng(3)
     touched, springs = set(), 0
     for _ in range(60):
-        scene = random_shapes(generator)
+        scene = random_shapes(generator, robot)
         springs += any(scene.mounted)
         changes = generator.uniform(-0.2, 0.6, 40)
         states = list(follow(Solver(robot, scene), np.column_stack([changes, np.zeros(40)])))
