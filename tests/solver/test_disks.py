@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
+from solver.forces import force_true
 from solver.formulation import disk_gap_function, limits, node_problem
+from solver.sensitivity import CABLE, sensitivity
 
 CIRCLE = Circle(center=(42, 143), radius=28)
 SIZES = pytest.mark.parametrize(("length", "radius", "thickness"), [(10, 8, 0), (15, 60, 0), (15, 40, 2), (10, 25, 3)])
@@ -134,6 +136,20 @@ def test_the_reference_solver_finds_the_same_where_disks_meet(radius, thickness,
         assert same.tension == pytest.approx(following.tension, rel=1e-8)
         assert same.disk_multipliers == pytest.approx(following.disk_multipliers, rel=1e-6, abs=1e-9)
         assert max(natural(same)) <= 1e-6
+
+
+@ROBOTS
+def test_sensitivities_hold_the_disks_that_meet(radius, thickness, before, after, most):
+    solver, step = Solver(make_robot(radius, thickness), Scene([CIRCLE])), 1e-4
+    start = pulled(solver, most - 0.5)[-1]
+    behind, here, ahead = (solver.step(start, most - 0.2 + change) for change in (-step, 0, step))
+    assert (here.disk_multipliers > 0).any()
+    assert (here.disk_multipliers < 0).any()
+    assert np.array_equal(np.sign(ahead.disk_multipliers), np.sign(behind.disk_multipliers))
+    slopes = sensitivity(here)
+    assert slopes.nodes[CABLE] == pytest.approx((ahead.nodes - behind.nodes) / (2 * step), rel=1e-5, abs=1e-5)
+    assert slopes.tension[CABLE] == pytest.approx((ahead.tension - behind.tension) / (2 * step), rel=1e-5)
+    assert slopes.forces[CABLE] == pytest.approx((force_true(ahead) - force_true(behind)) / (2 * step), rel=1e-5)
 
 
 def test_a_cable_that_shears_its_segments_has_no_disks_that_meet():
