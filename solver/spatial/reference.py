@@ -21,7 +21,7 @@ from solver.status import Status
 class SpatialReferenceSolver:
     """Follows the same equilibria as :class:`solver.spatial.SpatialSolver`, by the problem as the paper writes it.
 
-    Only a branch is followed: where it ends in a snap or a jam, a step is ``GAVE_UP``. Tensions are reported and not
+    Only a branch is followed: where it ends, a step is ``GAVE_UP``. Tensions are reported and not
     limited.
 
     Args:

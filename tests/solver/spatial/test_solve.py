@@ -140,7 +140,7 @@ def test_a_release_relieves_while_the_other_cable_is_pulled():
 
 
 def test_nothing_is_lost_where_the_way_is_blocked(robot, walk):
-    """In a narrow shaft the robot stalls, or jams where its motors hold everything, and still lets go."""
+    """In a narrow shaft the robot stalls, or is blocked where its motors hold everything, and still lets go."""
     shaft = Scene(HalfSpace(point=(x, y, 0), normal=(-x, -y, 0)) for x, y in ((9.5, 0), (-9.5, 0), (0, 9.5), (0, -9.5)))
     for limit, status in ((15.0, Status.STALLED), (math.inf, Status.BLOCKED)):
         solver = SpatialSolver(replace(robot, max_tension=limit), shaft)
