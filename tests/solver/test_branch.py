@@ -113,6 +113,19 @@ def test_touching_robot_keeps_its_pretension():
     assert walk(solver, slack, [0.5]).status is Status.CONVERGED
 
 
+def test_trace_begins_and_ends_with_the_equilibria_of_the_step():
+    robot = replace(Robot.prototype(), touch=LINES, between=1)
+    solver = Solver(robot, Scene([Circle(center=(33, 89), radius=12.5, stiffness=0.5)]))
+    before = walk(solver, solver.rest(), [3.0, 6.0])
+    after, trace = solver.step(before, 9.0), solver.trace(before, 9.0)
+    assert after.displacements.any()
+    for k, state in ((0, before), (-1, after)):
+        assert np.array_equal(trace.nodes[k], state.nodes)
+        assert trace.points[k] == pytest.approx(state.points, abs=1e-12)
+        assert np.array_equal(trace.displacements[k], state.displacements)
+    assert len(trace.nodes) == len(trace.points) == len(trace.displacements) > 4
+
+
 def test_steps_are_pure(circles):
     scene = circles(*BLOCKING)
     solver, other = (Solver(Robot.prototype(), scene) for _ in range(2))

@@ -182,10 +182,12 @@ def test_optimality_is_none_of_what_is_no_equilibrium(robot, walk):
 def test_trace_ends_where_the_step_does(robot, walk):
     solver = SpatialSolver(robot, Scene([SPHERE]))
     equilibrium = walk(solver, ((k / 2, k / 5) for k in range(1, 10)))
-    trace = solver.trace(equilibrium, (7.0, 2.0)).nodes
-    assert np.all(trace[0] == equilibrium.nodes)
-    assert np.all(trace[-1] == solver.step(equilibrium, (7.0, 2.0)).nodes)
-    assert np.linalg.norm(np.diff(trace, axis=0), axis=-1).max() < 9
+    trace = solver.trace(equilibrium, (7.0, 2.0))
+    for k, state in ((0, equilibrium), (-1, solver.step(equilibrium, (7.0, 2.0)))):
+        assert np.all(trace.nodes[k] == state.nodes)
+        assert trace.points[k] == pytest.approx(state.points, abs=1e-12)
+        assert np.all(trace.displacements[k] == state.displacements)
+    assert np.linalg.norm(np.diff(trace.nodes, axis=0), axis=-1).max() < 9
 
 
 @pytest.mark.parametrize("threads", [1, 2])
