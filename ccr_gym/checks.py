@@ -18,9 +18,7 @@ from typing import Any
 
 import numpy as np
 
-SMALLEST, LARGEST = 1e-30, 1e30  # of positive numbers, so that products of several stay finite
-SHOWN = 200  # characters of a value in a message
-REAL = (int, float, np.integer, np.floating)
+from solver.validation import LARGEST, is_listed, is_real, is_whole, shown
 
 
 def require(condition: bool, message: str) -> None:
@@ -101,7 +99,7 @@ def check_number(name: str, value: Any, **bounds: Any) -> float:
         ValueError: If it is no number, out of bounds, or not finite.
     """
     limits = Bounds(**bounds)
-    if not (is_real(value) and _finite(value) and value in limits):
+    if not (is_real(value) and value in limits):
         raise refusal(name, value, f"a number {limits}")
     return float(value)
 
@@ -109,7 +107,7 @@ def check_number(name: str, value: Any, **bounds: Any) -> float:
 def check_whole(name: str, value: Any, **bounds: Any) -> int:
     """Return a whole number as an int; bounds and errors as :func:`check_number`."""
     limits = Bounds(**bounds)
-    if not (_is_whole(value) and value in limits):
+    if not (is_whole(value) and value in limits):
         raise refusal(name, value, f"a whole number {limits}")
     return int(value)
 
@@ -127,9 +125,9 @@ def check_range(name: str, value: Any, *, whole: bool = False, **bounds: Any) ->
         ValueError: If it is anything else, an end is out of bounds or not finite, or the first exceeds the second.
     """
     limits, numbers = Bounds(**bounds), "whole numbers" if whole else "numbers"
-    known = _is_whole if whole else is_real
+    known = is_whole if whole else is_real
     paired = is_listed(value) and len(value) == 2 and all(map(known, value))
-    if not (paired and all(_finite(end) and end in limits for end in value) and value[0] <= value[1]):
+    if not (paired and all(end in limits for end in value) and value[0] <= value[1]):
         raise refusal(name, value, f"two {numbers} {limits}, the smaller one first")
     low, high = map(int if whole else float, value)
     return low, high
@@ -229,7 +227,7 @@ def check_seed(name: str, value: Any) -> int | None:
     """
     if value is None:
         return None
-    if not (_is_whole(value) and value >= 0):
+    if not (is_whole(value) and value >= 0):
         raise refusal(name, value, "None or a whole number from 0 on")
     return int(value)
 
@@ -245,36 +243,6 @@ def as_array(value: Any) -> np.ndarray:
         return np.asarray(value)
     except Exception:  # whatever an object raises when it is asked for its numbers
         return np.empty(0, object)
-
-
-def is_real(value: Any) -> bool:
-    """Return whether a value is a Python or numpy number, neither a bool, nor complex, nor an array."""
-    return isinstance(value, REAL) and not isinstance(value, bool | np.timedelta64)
-
-
-def is_listed(value: Any) -> bool:
-    """Return whether a value is a tuple, a list, or an array with a first axis."""
-    return isinstance(value, tuple | list) or (isinstance(value, np.ndarray) and value.ndim > 0)
-
-
-def shown(value: Any) -> str:
-    """Return a value as a message shows it: its representation, cut where it is long."""
-    try:
-        text = repr(value)
-    except Exception:  # an integer of thousands of digits, or an object that cannot be shown
-        return f"a {type(value).__name__}"
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
-
-
-def _is_whole(value: Any) -> bool:
-    return is_real(value) and isinstance(value, int | np.integer)
-
-
-def _finite(value: Any) -> bool:
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer beyond the floats
-        return False
 
 
 def _all_finite(array: np.ndarray) -> bool:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ccr_gym.checks import SMALLEST, check_fields, check_range, checked
+from ccr_gym.checks import check_fields, check_range, checked
+from solver.validation import SMALLEST
 
 if TYPE_CHECKING:
     from ccr_gym.bodies import Body

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from ccr_gym.checks import (
-    SMALLEST,
     check_choice,
     check_fields,
     check_flag,
@@ -20,6 +19,7 @@ from ccr_gym.reward import RewardWeights
 from ccr_gym.sensing import Sensing
 from solver import Robot
 from solver.spatial import SpatialRobot
+from solver.validation import SMALLEST
 
 MAX_FRICTION = 10.0
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from ccr_gym.bodies import IN_PLANE, IN_SPACE, INSERTED, Body
 from ccr_gym.checks import (
-    SMALLEST,
     check_array,
     check_fields,
     check_flag,
@@ -29,6 +28,7 @@ from solver.batch import BaseBatch
 from solver.scene import MAX_OBSTACLES
 from solver.solve import check_core
 from solver.spatial import Cylinder, SpatialRobot, Sphere
+from solver.validation import SMALLEST
 
 MAX_DRAWS = 1000
 HALF_CYLINDER_MM = 30.0

@@ -17,15 +17,14 @@ from ccr_gym.checks import (
     check_seed,
     check_type,
     check_whole,
-    is_listed,
     refusal,
     require,
-    shown,
 )
 from ccr_gym.env import METADATA, Observation, make_settings, single_spaces
 from ccr_gym.fleet import Fleet, Truth
 from ccr_gym.reward import TERMS
 from ccr_gym.tasks import Task
+from solver.validation import is_listed, shown
 
 Infos = dict[str, Any]
 MAX_ENVS = 65_536

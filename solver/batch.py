@@ -4,6 +4,7 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
+from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,10 +23,30 @@ from solver.validation import LARGEST, array, instance, positive, sequence, show
 MAX_PULL_STEPS = 100_000  # of a trial pull
 
 
+class _Turn:
+    """Held by the thread that uses a batch; another that tries meanwhile is refused before it has changed anything."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+
+    def __enter__(self) -> None:
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("the batch is in use by another thread; give each thread a batch of its own")
+
+    def __exit__(self, *error: object) -> None:
+        self._lock.release()
+
+
 class BaseBatch(ABC):
     """Moves many robots at once; each is moved as its solver would, bit for bit.
 
     Unlike the solver it keeps the present equilibria, as rows of arrays that are written in place.
+
+    One thread uses a batch at a time: a call while another thread is in one raises RuntimeError and changes nothing.
+    Ctrl-C, like any signal whose handler raises, ends a call within a fraction of a second, between two robots. Those
+    that have moved by then keep their new blocks, statuses and counts, the others are where they were, and
+    :attr:`commands` holds the new commands of all. After a :meth:`rest` cut short, none of its robots moves until it is
+    called again.
 
     Attributes:
         blocks: Equilibria, ``(N, size)``; :attr:`layout` tells where their numbers stand.
@@ -63,6 +84,7 @@ class BaseBatch(ABC):
         self.commands = np.zeros((self.count, self.model.cables + 1))
         self._fleet = self._make_fleet(obstacles, threads)
         self._all = list(range(self.count))
+        self._turn = _Turn()
         self._clear: Scene | None = None  # the scene last found to leave the straight robot clear
         self._straight: np.ndarray | None = None  # points of the straight robot, when they are first asked for
         self._unrested = set(self._all)  # must be put at rest before they move
@@ -115,9 +137,11 @@ class BaseBatch(ABC):
         check_core(self.robot, scene)
         if scene is not self._clear:
             check_clear(self.robot, scene, self._straight_gaps(scene))
-        self._fleet.assign(index, self._kernel_scene(scene))
-        self._scenes[index] = scene
-        self._unrested.add(index)
+        compiled = self._kernel_scene(scene)
+        with self._turn:
+            self._fleet.assign(index, compiled)
+            self._scenes[index] = scene
+            self._unrested.add(index)
 
     def leaves_clear(self, scene: Scene) -> bool:
         """Whether no obstacle of a scene overlaps the straight robot.
@@ -140,12 +164,14 @@ class BaseBatch(ABC):
         which = self._indices(robots)
         for robot in which:
             self.scene(robot)
-        self.blocks[which] = 0.0
-        self.blocks[which, self.layout.length_at] = self.robot.length_mm
-        self.commands[which] = 0.0
-        self.commands[which, -1] = self.robot.length_mm
-        self._move(which)
-        self._unrested.difference_update(which)
+        with self._turn:
+            self._unrested.update(which)
+            self.blocks[which] = 0.0
+            self.blocks[which, self.layout.length_at] = self.robot.length_mm
+            self.commands[which] = 0.0
+            self.commands[which, -1] = self.robot.length_mm
+            self._move(which)
+            self._unrested.difference_update(which)
 
     def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
         """Move the cables of all robots, or of some, as far as tension and obstacles allow.
@@ -162,10 +188,11 @@ class BaseBatch(ABC):
         cables = self.model.cables
         shape = (len(which),) if cables == 1 else (len(which), cables)
         commands = array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
-        self._check_rested(which)
-        self._check_lengths(which)
-        self.commands[which, :-1] = commands.reshape(-1, cables)
-        self._move(which)
+        with self._turn:
+            self._check_rested(which)
+            self._check_lengths(which)
+            self.commands[which, :-1] = commands.reshape(-1, cables)
+            self._move(which)
 
     def move(self, which: int | slice | list[int]) -> None:
         """Move one robot, some or all to their commands, which must be in range.
@@ -180,8 +207,9 @@ class BaseBatch(ABC):
             robots = self._indices(which)
         else:
             robots = [self._index(which)]
-        self._check_rested(robots)
-        self._move(robots)
+        with self._turn:
+            self._check_rested(robots)
+            self._move(robots)
 
     def probe(self, commands: np.ndarray) -> np.ndarray:
         """The equilibria that all robots would move to, ``(N, size)``; they stay where they are.
@@ -195,16 +223,23 @@ class BaseBatch(ABC):
         """
         bound = f"{self._bound}, and lengths from {self._low[-1]:.6g} to {self._high[-1]:.6g}"
         commands = array("commands", commands, self.commands.shape, self._low, self._high, bound)
-        self._check_rested(self._all)
-        self._check_lengths(self._all)
-        blocks, scratch = self.blocks.copy(), [np.zeros(self.count, np.int64) for _ in range(3)]
-        self._fleet.step(self._all, commands, blocks, *scratch)
+        with self._turn:
+            self._check_rested(self._all)
+            self._check_lengths(self._all)
+            blocks, scratch = self.blocks.copy(), [np.zeros(self.count, np.int64) for _ in range(3)]
+            self._fleet.step(self._all, commands, blocks, *scratch)
         return blocks
 
     def optimality(self) -> np.ndarray:
-        """How well the present equilibria meet their conditions, rows as :class:`solver.Optimality`, ``(N, 3)``."""
+        """How well the present equilibria meet their conditions, rows as :class:`solver.Optimality`, ``(N, 3)``.
+
+        Raises:
+            ValueError: If a robot is not at rest since it was put among other obstacles.
+        """
         found = np.zeros((self.count, 3))
-        self._fleet.optimality(self.blocks, found)
+        with self._turn:
+            self._check_rested(self._all)
+            self._fleet.optimality(self.blocks, found)
         return found
 
     def reaches(
@@ -248,7 +283,8 @@ class BaseBatch(ABC):
         target = -1 if obstacle is None else whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
         reached = np.zeros((count, self.model.space))
         length = self.robot.length_mm
-        found = self._fleet.reaches(which, forces, target, given, increment, limit, length, reached)
+        with self._turn:
+            found = self._fleet.reaches(which, forces, target, given, increment, limit, length, reached)
         return np.array(found, bool), reached
 
     def scene(self, index: int) -> Scene:
@@ -268,6 +304,10 @@ class BaseBatch(ABC):
         Raises:
             ValueError: If it is not at rest since it was put among other obstacles, or its block is none.
         """
+        with self._turn:
+            return self._equilibrium(index)
+
+    def _equilibrium(self, index: int) -> Any:
         scene = self.scene(index)
         self._check_rested([index])
         work = int(self.iterations[index]), int(self.factorizations[index])
@@ -291,7 +331,10 @@ class BaseBatch(ABC):
             return
         for robot in self._unrested.intersection(robots):
             self.scene(robot)
-            raise ValueError(f"robot {robot} was put among other obstacles; call rest([{robot}]) before it moves")
+            raise ValueError(
+                f"robot {robot} was put among other obstacles, or its rest was cut short; call rest([{robot}]) before "
+                "it moves"
+            )
 
     def _check_lengths(self, robots: list[int]) -> None:
         """Refuse blocks that someone has written another length into, or what is none."""
@@ -364,7 +407,7 @@ class ReferenceBatch(BatchSolver):
             if self.commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
                 reached = reference.rest()
             else:
-                reached = reference.step(self.equilibrium(robot), float(self.commands[robot, CABLE]))
+                reached = reference.step(self._equilibrium(robot), float(self.commands[robot, CABLE]))
             self.blocks[robot] = reached.block
             self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
 

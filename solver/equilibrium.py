@@ -247,7 +247,7 @@ class Equilibrium(BaseEquilibrium):
 
     @property
     def cable_mm(self) -> float:
-        """Cable displacement l, which differs from the command after a stall or jam [mm]."""
+        """Cable displacement l, which differs from the command where it stalled or was blocked [mm]."""
         return float(self.block[CABLE])
 
     @property

@@ -76,7 +76,7 @@ class _Pose(NamedTuple):
 class ReferenceSolver:
     """Follows the same equilibria as :class:`solver.Solver`, by the problem as the paper writes it.
 
-    Only a branch is followed: where it ends in a snap or a jam, a step is ``GAVE_UP``.
+    Only a branch is followed: where it ends, a step is ``GAVE_UP``.
 
     Args:
         robot: The robot.

@@ -67,7 +67,7 @@ def whole(name: str, value: Any, low: int, high: int, remedy: str = "") -> int:
     Raises:
         ValueError: Naming the value and the bounds.
     """
-    if not (isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)):
+    if not is_whole(value):
         raise ValueError(f"{name} is {shown(value)}; it must be a whole number from {low} to {high}{remedy}")
     if not low <= int(value) <= high:
         raise ValueError(f"{name} is {int(value)}; it must be a whole number from {low} to {high}{remedy}")
@@ -91,8 +91,7 @@ def sequence(name: str, value: Any, wanted: str) -> list[Any]:
     Raises:
         ValueError: Naming the value and what is wanted.
     """
-    is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    if not (is_sequence or (isinstance(value, np.ndarray) and value.ndim > 0)):
+    if not is_listed(value):
         raise ValueError(f"{name} is {shown(value)}; it must be {wanted}")
     return list(value)
 
@@ -218,9 +217,24 @@ def is_real(value: Any) -> bool:
     return isinstance(value, REAL) and not isinstance(value, bool | np.timedelta64)
 
 
+def is_whole(value: Any) -> bool:
+    """Whether a value is a Python or numpy integer, and no bool."""
+    return is_real(value) and isinstance(value, int | np.integer)
+
+
+def is_listed(value: Any) -> bool:
+    """Whether a value is a sequence, such as a tuple, a list or an array with a first axis, but no text."""
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
+
+
 def shown(value: Any) -> str:
     """A value as a message shows it, on one line and cut to a readable length."""
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # an integer of thousands of digits, or an object that cannot be shown
+        return f"a {type(value).__name__}"
     return text if len(text) <= SHOWN else text[:SHOWN] + "…"
 
 

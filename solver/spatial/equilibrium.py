@@ -29,7 +29,7 @@ class SpatialEquilibrium(BaseEquilibrium):
 
     @property
     def cables_mm(self) -> np.ndarray:
-        """Signed displacements of both pairs of cables, not as commanded after a stall or jam, ``(2,)`` [mm]."""
+        """Signed displacements of both pairs of cables; what was commanded unless stalled or blocked, ``(2,)`` [mm]."""
         return self._layout.cables(self.block)
 
     @property

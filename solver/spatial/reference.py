@@ -21,7 +21,7 @@ from solver.status import Status
 class SpatialReferenceSolver:
     """Follows the same equilibria as :class:`solver.spatial.SpatialSolver`, by the problem as the paper writes it.
 
-    Only a branch is followed: where it ends in a snap or a jam, a step is ``GAVE_UP``. Tensions are reported and not
+    Only a branch is followed: where it ends, a step is ``GAVE_UP``. Tensions are reported and not
     limited.
 
     Args:
@@ -68,13 +68,14 @@ class SpatialReferenceSolver:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
         target = check_cables(self.robot, self.scene, equilibrium, cables_mm)
-        now, largest = equilibrium, LARGEST_STEP
+        offset = self.robot.offset_mm
+        now, largest, smallest = equilibrium, LARGEST_STEP * offset, SMALLEST_STEP * offset
         while (distance := np.abs(target - now.cables_mm).max()) > 0:
             part = min(1.0, largest / distance)
             following = self._solve(now, target if part == 1 else now.cables_mm + part * (target - now.cables_mm))
             if following is not None:
                 now = following
-            elif largest > SMALLEST_STEP:
+            elif largest > smallest:
                 largest /= 2
             else:
                 return SpatialEquilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.GAVE_UP, 0)
@@ -82,7 +83,8 @@ class SpatialReferenceSolver:
 
     def _solve(self, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialEquilibrium | None:
         free = self._free(cables)
-        if np.abs(cables).max() < SLACK or (not start.contact.any() and free.gaps.min(initial=1.0) > 0):
+        slack = SLACK * self.robot.offset_mm
+        if np.abs(cables).max() < slack or (not start.contact.any() and free.gaps.min(initial=1.0) > 0):
             return free
         unknowns, _, _, pushes = start.node_solution()
         unit = np.abs(cables).max() / (self.robot.segments * self.robot.offset_mm)
@@ -98,7 +100,8 @@ class SpatialReferenceSolver:
         )
         reached = solution["x"].full().ravel()
         moved = np.linalg.norm((reached - unknowns).reshape(-1, 3), axis=1).max()
-        allowed = MOVE_OFFSET + MOVE_SLOPE * np.abs(cables - start.cables_mm).max()
+        pulled = np.abs(cables - start.cables_mm).max() / self.robot.offset_mm
+        allowed = self.robot.longest_mm * (MOVE_OFFSET + MOVE_SLOPE * pulled)
         stats = self._ipopt.stats()
         if not (stats["success"] and moved <= allowed):
             return None

@@ -85,11 +85,27 @@ def arguments(env_id, count):
     names = [field.name for field in fields(env.settings)] + ["task", "render_mode"]
     if count is not None:
         names += ["count", "threads", "max_episode_steps", "autoreset_mode"]
-    nested = {"weights": RewardWeights(), "sensing": Sensing(), "task": env.task}
+    nested = {"weights": RewardWeights(), "sensing": Sensing(), "task": env.task, "robot": env.settings.robot}
     choices = [(name,) for name in names]
     choices += [(outer, field.name) for outer, inner in nested.items() for field in fields(inner)]
-    choices += [(outer, "unheard_of") for outer in (*nested, "robot")] + [("unheard_of",)]
+    choices += [(outer, "unheard_of") for outer in nested] + [("unheard_of",)]
     return choices
+
+
+def given_as(env_id, name, value):
+    """Keyword arguments with a value in the place of a name; a robot has no defaults, so it keeps its other fields."""
+    if len(name) == 1:
+        return {name[0]: value}
+    robot = build(env_id, None).settings.robot
+    others = {field.name: getattr(robot, field.name) for field in fields(robot)} if name[0] == "robot" else {}
+    return {name[0]: others | {name[1]: value}}
+
+
+def words(name, kwargs):
+    """What a refusal may name: the argument, or what it fits ill with of the same robot."""
+    if name[0] == "robot" and len(name) == 2:
+        return tuple(kwargs["robot"])
+    return ("num_envs" if name == ("count",) else name[0], *name[1:])
 
 
 @EVERY_FORM
@@ -100,12 +116,12 @@ def test_arguments(env_id, count, monkeypatch):
     @settings(fuzz, max_examples=150)
     @given(st.sampled_from(arguments(env_id, count)), anything)
     def run(name, value):
-        kwargs = {name[0]: value} if len(name) == 1 else {name[0]: {name[1]: value}}
+        kwargs = given_as(env_id, name, value)
         try:
             env = build(env_id, count, **kwargs)
             env.reset(seed=0)
         except (ValueError, TypeError) as error:
-            named(error, *("num_envs" if part == "count" else part for part in name))
+            named(error, *words(name, kwargs))
             return
         except RuntimeError as error:
             named(error, UNREACHABLE)

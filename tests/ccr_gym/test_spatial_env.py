@@ -88,7 +88,7 @@ def test_the_vector_form_is_that_of_single_environments():
 
 def test_settings():
     assert make().unwrapped.settings.robot == SpatialRobot.prototype()
-    robot = {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0, "angle": 2.0}
+    robot = {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0, "angle": 2.0, "between": 1}
     observation, _ = make(robot=robot, obs_mode="dict").reset(seed=0)
     assert observation["nodes"].shape == (39,)
     with pytest.raises(ValueError, match="in space it must be 'native'"):

@@ -66,10 +66,10 @@ def random_spring(generator: np.random.Generator) -> float | None:
     return 10 ** generator.uniform(-2.5, 1.5) if generator.random() < 0.5 else None
 
 
-def random_shape(generator: np.random.Generator, thinnest: float) -> Obstacle:
-    """Any kind of obstacle in front of the robot, none thinner than ``thinnest`` from its middle."""
+def random_shape(generator: np.random.Generator) -> Obstacle:
+    """Any kind of obstacle in front of the robot."""
     x, y = generator.uniform((40, 75), (75, 150))
-    axis, across, along = generator.normal(size=2), generator.uniform(thinnest, 12), generator.uniform(thinnest, 20)
+    axis, across, along = generator.normal(size=2), generator.uniform(6, 12), generator.uniform(6, 20)
     axis /= np.linalg.norm(axis)
     match generator.integers(6):
         case 0:
@@ -91,12 +91,13 @@ def random_shape(generator: np.random.Generator, thinnest: float) -> Obstacle:
             return HalfPlane(point=(x, y), normal=(-1, generator.uniform(-1, 1)))
 
 
-def random_shapes(generator: np.random.Generator, thinnest: float = 6) -> Scene:
-    """One to four obstacles of any kind, fixed or on springs, that leave the unactuated robot free."""
+def random_shapes(generator: np.random.Generator, robot: Robot) -> Scene:
+    """One to four obstacles of any kind, fixed or on springs, with a core, that leave the unactuated robot free."""
     while True:
-        shapes = [random_shape(generator, thinnest) for _ in range(generator.integers(1, 5))]
+        shapes = [random_shape(generator) for _ in range(generator.integers(1, 5))]
         scene = Scene(replace(shape, stiffness=random_spring(generator)) for shape in shapes)
-        if free.clearance(Robot.prototype(), scene, 0.0) > 1:
+        cored = all(2 * shape.extent.inradius > max(robot.edges_mm) for shape in shapes)
+        if cored and free.clearance(robot, scene, 0.0) > 1:
             return scene
 
 
@@ -127,7 +128,7 @@ def random_scene_fixture() -> Callable[[np.random.Generator], Scene]:
 
 
 @pytest.fixture(name="random_shapes")
-def random_shapes_fixture() -> Callable[[np.random.Generator], Scene]:
+def random_shapes_fixture() -> Callable[[np.random.Generator, Robot], Scene]:
     return random_shapes
 
 

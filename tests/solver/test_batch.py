@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import threading
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -127,3 +129,146 @@ def test_a_probe_tells_where_a_step_would_lead_and_moves_nothing():
         assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
         batch.step(cables)
         assert np.array_equal(batch.blocks, probed)
+
+
+def crowd(count, segments, threads=1):
+    """Robots at rest, all before the same circle, whose step takes a while when they are many and finely divided."""
+    batch = BatchSolver(replace(Robot.prototype(), segments=segments), count, 1, threads)
+    scene = Scene([Circle(center=(44, 104), radius=15)])
+    for i in range(count):
+        batch.assign(i, scene)
+    batch.rest(range(count))
+    return batch
+
+
+@EVERY_CABLE
+def test_optimality(cable):
+    robot, generator = replace(Robot.prototype(), cable=cable), np.random.default_rng(6)
+    scenes = [Scene([circle]) for circle in circles(generator, 9)]
+    batch, solvers = BatchSolver(robot, 9, 1), [Solver(robot, scene) for scene in scenes]
+    for i, scene in enumerate(scenes):
+        batch.assign(i, scene)
+    batch.rest(range(9))
+    assert batch.optimality().max() <= 1e-12
+    for _ in range(14):
+        batch.step(batch.blocks[:, 0] + 0.5)
+        found = batch.optimality()
+        assert found.shape == (9, 3)
+        assert found.max() <= 1e-8
+        alone = [solver.optimality(batch.equilibrium(i)) for i, solver in enumerate(solvers)]
+        assert np.array_equal(found, alone)
+    assert (batch.statuses == Status.CONVERGED).all()
+    assert sum(batch.equilibrium(i).contact.any() for i in range(9)) >= 3
+
+
+@EVERY_CABLE
+def test_optimality_of_what_is_no_equilibrium(cable):
+    """A robot whose segments are bent a little otherwise, or whose contact pushes harder, than it should."""
+    robot, scene = replace(Robot.prototype(), cable=cable), Scene([Circle(center=(44, 104), radius=15)])
+    batch, solver = BatchSolver(robot, 3, 1), Solver(robot, scene)
+    for i in range(3):
+        batch.assign(i, scene)
+    batch.rest(range(3))
+    for cable_mm in np.arange(1, 9):
+        batch.step(np.full(3, float(cable_mm)))
+    bent, pushed = batch.layout.coordinates(batch.blocks[1]), batch.layout.multipliers(batch.blocks[2])
+    assert pushed.any()
+    bent += 0.01 * np.cos(np.arange(robot.segments))
+    pushed *= 1.5
+    found = batch.optimality()
+    assert found[0].max() <= 1e-8
+    assert (found[1:, 0] >= 1e-5).all()
+    for i in (1, 2):
+        assert np.array_equal(solver.optimality(batch.equilibrium(i)), found[i])
+
+
+def test_a_batch_in_use_by_another_thread_says_so_and_nothing_of_it_changes():
+    batch, twin = crowd(300, 150), crowd(300, 150)
+    running = threading.Thread(target=batch.step, args=(np.full(300, 9.0),))
+    running.start()
+    while not batch.commands[:, 0].all():  # which the step writes first
+        time.sleep(0.001)
+    time.sleep(0.05)
+    uses = [
+        lambda: batch.step(np.full(300, 2.0)),
+        lambda: batch.assign(7, Scene([Circle(center=(50, 104), radius=15)])),
+        lambda: batch.rest([299]),
+        lambda: batch.move(299),
+        lambda: batch.probe(batch.commands),
+        lambda: batch.equilibrium(299),
+        batch.optimality,
+        lambda: batch.reaches([299], np.array([0.1]), 0.5, 9.0),
+    ]
+    for use in uses:
+        with pytest.raises(RuntimeError, match="in use by another thread; give each thread a batch of its own"):
+            use()
+    assert running.is_alive()
+    running.join()
+    twin.step(np.full(300, 9.0))
+    assert np.array_equal(batch.blocks, twin.blocks)
+    assert np.array_equal(batch.commands, twin.commands)
+    batch.step(np.full(300, 9.5))  # and it is free again
+    assert batch.blocks[299, 0] == 9.5
+
+
+INTERRUPTED = """
+import signal, threading, time
+import numpy as np
+from solver import Circle, Robot, Scene
+from solver.batch import BatchSolver
+
+robot, scene = Robot(length_mm=180, segments=200, offset_mm=8), Scene([Circle(center=(44, 104), radius=15)])
+count = 4000
+batch = BatchSolver(robot, count, 1, threads=THREADS)
+for i in range(count):
+    batch.assign(i, scene)
+batch.rest(range(count))
+before = batch.blocks.copy()
+
+def interrupt():
+    while not (batch.blocks[20, 0] == 9.0).all():
+        time.sleep(0.001)
+    global sent
+    sent = time.monotonic()
+    signal.raise_signal(signal.SIGINT)
+
+threading.Thread(target=interrupt).start()
+try:
+    batch.step(np.full(count, 9.0))
+except KeyboardInterrupt:
+    late = time.monotonic() - sent
+else:
+    raise SystemExit("the step was not interrupted")
+assert late < 1, late
+moved = batch.blocks[:, 0] == 9.0
+assert 20 < moved.sum() < count, moved.sum()
+assert np.array_equal(batch.blocks[~moved], before[~moved])
+assert np.array_equal(batch.blocks[moved], np.tile(batch.blocks[20], (moved.sum(), 1)))
+last = int(np.flatnonzero(~moved)[-1])
+batch.step(np.array([9.0]), [last])
+assert np.array_equal(batch.blocks[last], batch.blocks[20])
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_ctrl_c_ends_a_long_step_between_two_robots(threads):
+    program = INTERRUPTED.replace("THREADS", str(threads))
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=120)
+
+
+def test_robots_whose_rest_was_cut_short_do_not_move_until_they_rest(monkeypatch):
+    def interrupted(robots):
+        raise KeyboardInterrupt
+
+    batch = crowd(3, 18)
+    batch.step(np.full(3, 9.0))
+    with monkeypatch.context() as patch:
+        patch.setattr(batch, "_move", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            batch.rest([1])
+    for use in (lambda: batch.move(1), lambda: batch.equilibrium(1), lambda: batch.step(np.full(3, 9.5))):
+        with pytest.raises(ValueError, match=r"its rest was cut short; call rest\(\[1\]\) before it moves"):
+            use()
+    batch.rest([1])
+    batch.step(np.full(3, 9.0))
+    assert batch.blocks[:, 0].tolist() == [9.0, 9.0, 9.0]

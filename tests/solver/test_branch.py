@@ -1,4 +1,4 @@
-"""Where a branch ends: stall, jam, snap and pretension."""
+"""Where a branch ends: stall, block, snap and pretension."""
 
 import math
 from dataclasses import replace
@@ -56,13 +56,13 @@ def test_release_from_a_stall(circles, pulls):
     assert np.array_equal(released.nodes, solver.rest().nodes)
 
 
-def test_jam(circles, pulls):
+def test_blocked(circles, pulls):
     solver = Solver(Robot.prototype(max_tension=math.inf), circles(*BLOCKING))
-    jammed = walk(solver, solver.rest(), pulls(14.0, 0.25))
-    assert jammed.status is Status.BLOCKED
-    assert 12 < jammed.cable_mm < 13
-    assert certified(jammed)
-    released = walk(solver, jammed, [12.0])
+    blocked = walk(solver, solver.rest(), pulls(14.0, 0.25))
+    assert blocked.status is Status.BLOCKED
+    assert 12 < blocked.cable_mm < 13
+    assert certified(blocked)
+    released = walk(solver, blocked, [12.0])
     assert released.status in (Status.CONVERGED, Status.SNAPPED)
     assert released.cable_mm == 12.0
     assert certified(released)
@@ -84,7 +84,7 @@ def test_snap(pair, step, circles, pulls, swept, clearance):
         assert not swept(shapes, robot, scene).any()
         assert np.linalg.norm(np.diff(shapes[..., :2], axis=0), axis=-1).max(initial=0) <= 0.5 + 16 * min(step, 0.5)
         assert certified(equilibrium)
-    if step < 1:  # a large step that jams after its snap reports the jam
+    if step < 1:  # a large step that is blocked after its snap reports that
         assert Status.SNAPPED in statuses
 
 
@@ -111,6 +111,19 @@ def test_touching_robot_keeps_its_pretension():
     assert slack.status is Status.CONVERGED
     assert slack.cable_mm == pytest.approx(0.05, abs=1e-12)
     assert walk(solver, slack, [0.5]).status is Status.CONVERGED
+
+
+def test_trace_begins_and_ends_with_the_equilibria_of_the_step():
+    robot = replace(Robot.prototype(), touch=LINES, between=1)
+    solver = Solver(robot, Scene([Circle(center=(33, 89), radius=12.5, stiffness=0.5)]))
+    before = walk(solver, solver.rest(), [3.0, 6.0])
+    after, trace = solver.step(before, 9.0), solver.trace(before, 9.0)
+    assert after.displacements.any()
+    for k, state in ((0, before), (-1, after)):
+        assert np.array_equal(trace.nodes[k], state.nodes)
+        assert trace.points[k] == pytest.approx(state.points, abs=1e-12)
+        assert np.array_equal(trace.displacements[k], state.displacements)
+    assert len(trace.nodes) == len(trace.points) == len(trace.displacements) > 4
 
 
 def test_steps_are_pure(circles):
@@ -190,7 +203,7 @@ def test_motor_yields_where_a_release_snaps_to_more_tension_than_it_holds(pulls)
 
 
 @pytest.mark.parametrize(("x", "release"), [(67.05, 0.03), (67.1, 0.1), (67.4, 0.31)])
-def test_a_tip_that_rolls_onto_a_circle_is_not_taken_for_jammed(x, release):
+def test_a_tip_that_rolls_onto_a_circle_is_not_taken_for_blocked(x, release):
     """Two gaps close at the end of the descent, which costs more energy than is left to win."""
     robot = replace(Robot.prototype(), cable="sliding")
     solver = Solver(robot, Scene([Circle(center=(x, 132.6), radius=13.7)]))

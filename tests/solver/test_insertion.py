@@ -70,13 +70,13 @@ def test_cable_holds_where_the_wall_bends_the_robot_the_other_way():
 
 
 @EVERY_CABLE
-def test_straight_robot_jams_head_on(cable):
+def test_straight_robot_is_blocked_head_on(cable):
     """Nothing tells it which way to give."""
     solver = Solver(robot_with(cable), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
-    jammed = inserted(solver, (0.0, 155))
-    assert jammed.status is Status.BLOCKED
-    assert jammed.length_mm == pytest.approx(150, abs=1e-3)
-    assert np.array_equal(solver.step(jammed, 0.0, 120).block, solver.rest().block)
+    blocked = inserted(solver, (0.0, 155))
+    assert blocked.status is Status.BLOCKED
+    assert blocked.length_mm == pytest.approx(150, abs=1e-3)
+    assert np.array_equal(solver.step(blocked, 0.0, 120).block, solver.rest().block)
 
 
 def test_buckled_robot_is_pulled_back_straight():
@@ -96,7 +96,7 @@ def test_length_out_of_range_is_refused():
         fixed.step(fixed.rest(), 1.0, 181)
 
 
-def test_long_insertion_is_not_taken_for_a_jam():
+def test_long_insertion_is_not_taken_for_blocked():
     robot = Robot(length_mm=100, segments=18, offset_mm=8, length_range_mm=(100, 2000))
     solver = Solver(robot, Scene())
     assert solver.step(solver.rest(), 5.0, 2000).status is Status.CONVERGED

@@ -347,7 +347,7 @@ def test_a_robot_put_among_other_obstacles_rests_before_it_moves(batch, circles)
     batch.step(np.full(4, 8.0))
     before = batch.blocks.copy()
     batch.assign(3, circles((41, 104, 15)))
-    message = r"robot 3 was put among other obstacles; call rest\(\[3\]\) before it moves"
+    message = r"robot 3 was put among other obstacles, or its rest was cut short; call rest\(\[3\]\) before it moves"
     for move in (
         lambda: batch.step(np.full(4, 8.0)),
         lambda: batch.step(np.full(1, 8.0), [3]),

@@ -15,14 +15,14 @@ def turned(vectors, angle):
     return np.asarray(vectors) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
 
 
-def random_shape(generator, spring=0.3):
-    """An obstacle of any kind around the robot, on a spring as often as asked for."""
+def random_shape(generator):
+    """An obstacle of any kind around the robot, now and then on a spring."""
     azimuth, radius = generator.uniform(0, 2 * math.pi), generator.uniform(10, 16)
     outward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     center = generator.uniform(35, 75) * outward + [0.0, 0.0, generator.uniform(75, 150)]
     axis, second = generator.normal(size=(2, 3))
     axis /= np.linalg.norm(axis)
-    stiffness = float(np.exp(generator.uniform(-3, 1))) if generator.random() < spring else None
+    stiffness = float(np.exp(generator.uniform(-3, 1))) if generator.random() < 0.3 else None
     match generator.integers(5):
         case 0:
             return Sphere(center=center, radius=radius, stiffness=stiffness)
@@ -38,17 +38,11 @@ def random_shape(generator, spring=0.3):
             return HalfSpace(point=center, normal=0.3 * axis - outward, stiffness=stiffness)
 
 
-def random_sphere(generator):
-    azimuth = generator.uniform(0, 2 * math.pi)
-    x, y = generator.uniform(35, 75) * np.array([math.cos(azimuth), math.sin(azimuth)])
-    return Sphere(center=(x, y, generator.uniform(75, 150)), radius=generator.uniform(10, 16))
-
-
-def random_solver(generator, robot, draw):
+def random_solver(generator, robot):
     """A robot among one to three obstacles that leave it free at rest."""
     while True:
         try:
-            return SpatialSolver(robot, Scene(draw(generator) for _ in range(generator.integers(1, 4))))
+            return SpatialSolver(robot, Scene(random_shape(generator) for _ in range(generator.integers(1, 4))))
         except ValueError:
             continue
 
@@ -74,16 +68,6 @@ def robot_fixture():
 @pytest.fixture(scope="session", name="turned")
 def turned_fixture():
     return turned
-
-
-@pytest.fixture(scope="session", name="random_shape")
-def random_shape_fixture():
-    return random_shape
-
-
-@pytest.fixture(scope="session", name="random_sphere")
-def random_sphere_fixture():
-    return random_sphere
 
 
 @pytest.fixture(scope="session", name="random_solver")

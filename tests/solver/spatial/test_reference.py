@@ -65,6 +65,20 @@ def test_an_equilibrium_of_the_reference_is_one_of_the_kernel(robot):
     assert here.points == pytest.approx(reference.step(there, there.cables_mm + np.array([0.0, 0.1])).points, abs=1e-6)
 
 
+@pytest.mark.parametrize("s", [0.1, 10.0])
+def test_a_robot_of_another_size_is_followed_alike(s):
+    def end(s):
+        robot = SpatialRobot(length_mm=180 * s, segments=6, offset_mm=8 * s, rigidity=5e3 * s * s, between=3)
+        solver = SpatialReferenceSolver(robot, Scene([Sphere(center=(40 * s, 18 * s, 104 * s), radius=15 * s)]))
+        return solver.step(solver.rest(), (5.0 * s, 2.0 * s))
+
+    here, there = end(1.0), end(s)
+    assert here.status is there.status is Status.CONVERGED
+    assert here.contact.any()
+    assert there.points / s == pytest.approx(here.points, abs=1e-5)
+    assert there.tensions == pytest.approx(here.tensions, abs=1e-6)
+
+
 def test_derivatives_are_smooth_where_disks_are_parallel(robot):
     problem = spatial_problem(robot, (), ())
     slope = ca.Function(

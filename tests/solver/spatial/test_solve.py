@@ -94,11 +94,11 @@ def test_quarter_turns_take_other_cables(quarters, robot, turned, walk):
 
 @settings(max_examples=12, deadline=None, derandomize=True, database=None)
 @given(seed=st.integers(0, 2**32 - 1), angle=st.floats(0.8, 2.3))
-def test_random_walks_are_certified(seed, angle, random_shape, random_solver, random_walk):
+def test_random_walks_are_certified(seed, angle, random_solver, random_walk):
     generator = np.random.default_rng(seed)
     lines = ("backbone", "holes") if generator.random() < 0.5 else ("backbone", "rim")
     robot = replace(SpatialRobot.prototype(angle=angle), touch=lines, rim_points=8, between=int(generator.integers(2)))
-    for equilibrium in random_walk(generator, random_solver(generator, robot, random_shape), 60)[::15]:
+    for equilibrium in random_walk(generator, random_solver(generator, robot), 60)[::15]:
         assert equilibrium.status is not Status.GAVE_UP
         stationarity, lengths, gaps, complementarity, sign = equilibrium.residuals()
         assert stationarity < 1e-8
@@ -140,7 +140,7 @@ def test_a_release_relieves_while_the_other_cable_is_pulled():
 
 
 def test_nothing_is_lost_where_the_way_is_blocked(robot, walk):
-    """In a narrow shaft the robot stalls, or jams where its motors hold everything, and still lets go."""
+    """In a narrow shaft the robot stalls, or is blocked where its motors hold everything, and still lets go."""
     shaft = Scene(HalfSpace(point=(x, y, 0), normal=(-x, -y, 0)) for x, y in ((9.5, 0), (-9.5, 0), (0, 9.5), (0, -9.5)))
     for limit, status in ((15.0, Status.STALLED), (math.inf, Status.BLOCKED)):
         solver = SpatialSolver(replace(robot, max_tension=limit), shaft)
@@ -165,21 +165,37 @@ def test_a_robot_that_slips_off_says_so(robot):
     assert not equilibrium.contact.any()
 
 
+def test_optimality_is_none_of_what_is_no_equilibrium(robot, walk):
+    """A robot bent a little otherwise, or whose contacts push harder, than it should."""
+    solver = SpatialSolver(robot, Scene([SPHERE]))
+    pressed = walk(solver, ((k / 2, k / 5) for k in range(1, 17)))
+    assert max(solver.optimality(pressed)) <= 1e-8
+    places = pressed._layout
+    for part, change in ((places.coordinates, 0.02), (places.multipliers, 1e-3)):
+        block = pressed.block.copy()
+        numbers = part(block)
+        numbers[numbers != 0] += change
+        made = replace(pressed, block=block)
+        assert solver.optimality(made).stationarity >= 1e-5
+
+
 def test_trace_ends_where_the_step_does(robot, walk):
     solver = SpatialSolver(robot, Scene([SPHERE]))
     equilibrium = walk(solver, ((k / 2, k / 5) for k in range(1, 10)))
-    trace = solver.trace(equilibrium, (7.0, 2.0)).nodes
-    assert np.all(trace[0] == equilibrium.nodes)
-    assert np.all(trace[-1] == solver.step(equilibrium, (7.0, 2.0)).nodes)
-    assert np.linalg.norm(np.diff(trace, axis=0), axis=-1).max() < 9
+    trace = solver.trace(equilibrium, (7.0, 2.0))
+    for k, state in ((0, equilibrium), (-1, solver.step(equilibrium, (7.0, 2.0)))):
+        assert np.all(trace.nodes[k] == state.nodes)
+        assert trace.points[k] == pytest.approx(state.points, abs=1e-12)
+        assert np.all(trace.displacements[k] == state.displacements)
+    assert np.linalg.norm(np.diff(trace.nodes, axis=0), axis=-1).max() < 9
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_batch_is_many_solvers(robot, threads, random_shape, random_solver, random_walk):
+def test_a_batch_is_many_solvers(robot, threads, random_solver, random_walk):
     generator = np.random.default_rng(3)
     solvers = []
     while len(solvers) < 24:
-        solver = random_solver(generator, robot, random_shape)
+        solver = random_solver(generator, robot)
         if len(solver.scene) == 2:
             solvers.append(solver)
     walks = [random_walk(generator, solver, 40) for solver in solvers]
