@@ -65,8 +65,8 @@ inline constexpr int kSubSteps = 400;           // beside those of the largest s
 inline constexpr int kBranchEnds = 24;          // ends met in one step before the search is given up
 
 // Sweep: how deep the straight way of a point may cut into an obstacle, over the radius of the largest ball inside it.
-inline constexpr double kSweepDepth = 0.125;
-inline constexpr double kSweepStride = 0.5;     // of the smallest radius of a surface: a way too short to cut so deep
+inline constexpr double kSweepDepth = 0.01;
+inline constexpr double kSweepStride = 0.28;    // of the smallest radius of a surface: a way too short to cut so deep
 inline constexpr int kSweepStrides = 256;       // along one way before it counts as barred
 inline constexpr int kEdgeHalvings = 7;         // to find the deepest point of an edge
 
