@@ -82,7 +82,7 @@ inline constexpr int kStallIterations = 40;
 inline constexpr double kCommandResolution = 1.25e-12;  // a narrower bracket is not searched [a]
 
 // Feasible descent after a branch end.
-inline constexpr double kFenceShear = 0.8;      // squared shear over its limit's from which it is fenced
+inline constexpr double kFenceShear = 0.95;     // squared shear over its limit's from which it is fenced
 inline constexpr double kFence = 10.0;          // curvature of the fence [rad^2]
 inline constexpr int kDescentIterations = 300;
 inline constexpr int kFinishEvery = 8;          // iterates between trials of Newton's method

@@ -256,7 +256,7 @@ Verdict Newton<Model>::descend(Iterate& at, double largest, bool& moved) {
     at.active = closed(target);
     moved = true;
     // Far from where it leads a heavily damped step is too short, near there a penalty that closes gaps costs nothing.
-    creeping_ = scale * size(step_) < kCreep;
+    creeping_ = !creeping_ && scale * size(step_) < kCreep;
     if (stretched) stretch_ = scale == farthest ? kStretch * scale : std::max(kStretch, scale);
     return verdict;
   }
