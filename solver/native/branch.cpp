@@ -507,6 +507,16 @@ bool Branch<Model>::depart(const Command& command, bool holding) {
   return newton_.restore(trial_) && close_by();
 }
 
+// The same a part of the way to a command, where it need not be as far.
+template <class Model>
+bool Branch<Model>::leave(const Command& command) {
+  for (double part = 1; part >= kSmallestPart; part /= 8) {
+    const Command nearer = between(present_.command, command, part);
+    if (depart(nearer, true) || depart(nearer, false)) return true;
+  }
+  return false;
+}
+
 // Whether an iterate of the descent is near the last one, and nothing was passed through on the way.
 template <class Model>
 bool Branch<Model>::close_by() const {
@@ -534,7 +544,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
   };
 
   newton_.chain.fence(true);
-  bool moved = newton_.measure(present_) && (depart(command, true) || depart(command, false));
+  bool moved = newton_.measure(present_) && leave(command);
   for (int i = 0; i < kDescentIterations && moved && !spent(); ++i) {
     std::swap(present_, trial_);
     remember();

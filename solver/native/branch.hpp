@@ -125,6 +125,7 @@ class Branch : public Follower<Model::kSpace> {
   End pass_end(const Command& command);
   bool finish();
   bool depart(const Command& command, bool holding);
+  bool leave(const Command& command);
   bool descend(bool& moved);
   double farthest() const;
   bool close_by() const;

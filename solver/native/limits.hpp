@@ -87,6 +87,7 @@ inline constexpr double kFence = 10.0;          // curvature of the fence [rad^2
 inline constexpr int kDescentIterations = 300;
 inline constexpr int kFinishEvery = 8;          // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;     // largest step of one iterate
+inline constexpr double kSmallestPart = 1e-3;   // of the step that ends a branch, that a descent begins with
 inline constexpr double kCreep = 1e-4;          // size of an iterate that hardly moves
 inline constexpr double kStretch = 8.0;         // of the first damped iterate, and of the next ones over those that went well
 inline constexpr double kDescentFeasibility = 6e-14;  // [L]
