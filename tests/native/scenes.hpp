@@ -33,6 +33,23 @@ int ball_law(const double** in, double** out, int*, double*, int) {
   return 0;
 }
 
+// Points of a circle or a ball.
+template <int D>
+std::vector<Position<D>> ball_outline(const Position<D>& center, double r) {
+  constexpr int kAround = D == 2 ? 96 : 32, kRows = D == 2 ? 1 : 17;
+  std::vector<Position<D>> outline;
+  for (int row = 0; row < kRows; ++row)
+    for (int k = 0; k < kAround; ++k) {
+      const double angle = 2 * std::numbers::pi * k / kAround, up = std::numbers::pi * ((row + 0.5) / kRows - 0.5);
+      Position<D> point = center;
+      point[0] += r * std::cos(up) * std::cos(angle);
+      point[1] += r * std::cos(up) * std::sin(angle);
+      if (D == 3) point[D - 1] += r * std::sin(up);
+      outline.push_back(point);
+    }
+  return outline;
+}
+
 template <int D>
 Obstacle<D> make_custom(const Robot& robot, const Position<D>& center, double r, double stiffness = 0) {
   std::array<double, D + 1> ball;
@@ -41,6 +58,7 @@ Obstacle<D> make_custom(const Robot& robot, const Position<D>& center, double r,
   Obstacle<D> obstacle = make_obstacle<D>(robot, D == 2 ? Shape::kCircle : Shape::kSphere, ball, stiffness);
   obstacle.shape = Shape::kCustom;
   obstacle.law = ball_law<D>;
+  obstacle.outline = ball_outline(center, r);
   return obstacle;
 }
 
@@ -156,7 +174,7 @@ struct View {
 template <int D>
 Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, double springs = 0.2) {
   Setting<D> out{make_robot<D>(of), {}, {}};
-  const double spacing = of.length / (of.segments * (of.between + 1));
+  const double longest = *std::max_element(out.robot.edges.begin(), out.robot.edges.end());
   const auto follower = make_follower<D>(out.robot, 1);
   for (int tries = 0; static_cast<int>(out.obstacles.size()) < count && tries < 200; ++tries) {
     Position<D> at = random.direction<D>();
@@ -165,7 +183,7 @@ Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, dou
     const double size = D == 2 ? 1 : std::hypot(at[0], at[1]);
     for (int k = 0; k < D - 1; ++k) at[k] *= out_of / size;
     at[D - 1] = of.length * random.uniform(0.3, 0.95);
-    const double r = std::max(of.length * random.uniform(0.04, 0.1), 1.1 * spacing);
+    const double r = std::max(of.length * random.uniform(0.04, 0.1), 0.55 * longest);
     const double unit = of.rigidity / (of.length * of.length * of.length);
     const double stiffness = random.chance(springs) ? unit * random.decades(0, 4) : 0;
     const std::vector<Obstacle<D>> alone = {random_obstacle(random, out.robot, random.integer(0, kShapes - 1), at, r, stiffness)};
