@@ -46,12 +46,12 @@ inline double ellipse_distance(const double* p, const Position<2>& point) {
   const Position<2> offset = minus(point, position<2>(p));
   const double along = offset[0] * p[4] + offset[1] * p[5], across = offset[1] * p[4] - offset[0] * p[5];
   const auto distance = [&](double angle) { return std::hypot(p[2] * std::cos(angle) - along, p[3] * std::sin(angle) - across); };
-  constexpr int kParts = 720;
+  constexpr int kParts = 72;
   int best = 0;
   for (int k = 1; k < kParts; ++k)
     if (distance(2 * std::numbers::pi * k / kParts) < distance(2 * std::numbers::pi * best / kParts)) best = k;
   double low = 2 * std::numbers::pi * (best - 1) / kParts, high = 2 * std::numbers::pi * (best + 1) / kParts;
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 40; ++i) {
     const double first = low + (high - low) / 3, second = high - (high - low) / 3;
     (distance(first) < distance(second) ? high : low) = distance(first) < distance(second) ? second : first;
   }

@@ -31,6 +31,7 @@ void tell() { std::fprintf(stderr, "fuzz: failed in the episode of seed %llu\n",
 struct Tally {
   long episodes = 0, steps = 0, touching = 0, iterations = 0;
   long statuses[kStatuses] = {};
+  std::uint64_t seen[kStatuses] = {};  // seed of the episode that met a status last
   int hardest = 0;  // factorisations of a step
 };
 
@@ -84,6 +85,7 @@ bool run(Random& random, Clock::time_point end, Tally& tally) {
     }
     ++tally.steps;
     ++tally.statuses[status];
+    tally.seen[status] = present;
     tally.iterations += iterations;
     tally.hardest = std::max(tally.hardest, factorizations);
     tally.touching += std::any_of(&to[view.force], &to[view.force] + D, [](double part) { return part != 0; });
@@ -122,6 +124,9 @@ int main(int count, char** arguments) {
   } while (!once && Clock::now() < end);
   std::printf("fuzz: %ld episodes, %ld steps, %ld of them in contact, %ld iterations, at most %d factorisations in a step; statuses",
               tally.episodes, tally.steps, tally.touching, tally.iterations, tally.hardest);
-  for (const long number : tally.statuses) std::printf(" %ld", number);
+  for (int k = 0; k < kStatuses; ++k) {
+    std::printf(" %ld", tally.statuses[k]);
+    if (k > 2 && tally.statuses[k] > 0) std::printf(" (seed %llu)", static_cast<unsigned long long>(tally.seen[k]));
+  }
   std::printf("\n");
 }

@@ -10,7 +10,7 @@ namespace ccr::testing {
 namespace {
 
 constexpr double kScales[] = {1e-3, 1, 1e3};
-constexpr int kMoments = 60, kParts = 40;
+constexpr int kMoments = 40, kParts = 24, kPathParts = 160;
 
 template <int D>
 Position<D> between(const Position<D>& a, const Position<D>& b, double part) {
@@ -31,7 +31,8 @@ Position<D> beside(Random& random, const Position<D>& place, double distance) {
 template <int D>
 double deepest_of_path(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to) {
   double deepest = -kInfinity;
-  for (int k = 0; k <= 400; ++k) deepest = std::max(deepest, -signed_distance(obstacle, between(from, to, k / 400.0)));
+  for (int k = 0; k <= kPathParts; ++k)
+    deepest = std::max(deepest, -signed_distance(obstacle, between(from, to, static_cast<double>(k) / kPathParts)));
   return deepest;
 }
 
