@@ -90,7 +90,7 @@ inline double signed_distance(const Obstacle<3>& obstacle, const Position<3>& po
       for (int k = 0; k < 3; ++k) excess[k] = std::abs(dot(offset, position<3>(p + 3 + 3 * k))) - p[12 + k];
       return beyond<3>(excess) - p[15];
     }
-    default: return norm(offset) - p[3];  // a sphere, compiled or not
+    default: return norm(offset) - p[3];  // a sphere
   }
 }
 
