@@ -9,7 +9,7 @@ NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/pytho
 BUILD = $(BIN)/cmake --build
 CHECK = $(BIN)/ctest --output-on-failure --test-dir
 SEED ?= 1
-FUZZ ?= 60
+FUZZ ?= 45
 
 demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controllers, write figures and videos to runs/demo
 	$(BIN)/ccr-gym train --run runs/demo

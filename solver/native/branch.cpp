@@ -302,26 +302,30 @@ bool Branch<Model>::passable(double moved) const {
     const auto& obstacle = chain.obstacles()[j];
     if (chain.far(j, moved)) continue;
     if (moved <= harmless_path(obstacle) && moved <= harmless_motion(obstacle, longest)) continue;
-    if (!unswept(obstacle, chain.mount_of(j), moved)) return false;
+    if (!unswept(j, moved)) return false;
   }
   return true;
 }
 
 template <class Model>
-bool Branch<Model>::unswept(const Obstacle<kSpace>& obstacle, int mount, double moved) const {
-  const Robot& robot = newton_.chain.robot();
+bool Branch<Model>::unswept(int j, double moved) const {
+  const Chain& chain = newton_.chain;
+  const Robot& robot = chain.robot();
+  const auto& obstacle = chain.obstacles()[j];
+  const double* gaps = chain.gaps().data() + j * points_.size();
+  const int mount = chain.mount_of(j);
   const Position before = mount < 0 ? Position{} : mounts_[mount], now = mount < 0 ? Position{} : trial_.mounts[mount];
   const double path = harmless_path(obstacle);
   const auto from = [&](int k) { return minus(points_[k], before); };
-  const auto to = [&](int k) { return minus(newton_.chain.points()[k], now); };
-  const auto beyond = [&](int k, double reach) { return clearance_beyond(obstacle, from(k), reach) > 0; };
+  const auto to = [&](int k) { return minus(chain.points()[k], now); };
+  const auto away = [&](int k) { return distance_outside(obstacle, gaps[k]) >= moved; };  // all the way
   for (int line = 0, first = 0; line < static_cast<int>(robot.lines.size()); ++line, first += robot.positions()) {
     const double longest = robot.edges[line];
     const bool edges = moved > harmless_motion(obstacle, longest);
     for (int k = first; k < first + robot.positions(); ++k) {
-      if (!obstacle.touchable[k] || beyond(k, moved + longest)) continue;
-      if (norm(minus(to(k), from(k))) > path && !path_clear(obstacle, from(k), to(k))) return false;
-      if (!edges || k + 1 == first + robot.positions() || !obstacle.touchable[k + 1]) continue;
+      if (!obstacle.touchable[k]) continue;
+      if (!away(k) && norm(minus(to(k), from(k))) > path && !path_clear(obstacle, from(k), to(k))) return false;
+      if (!edges || k + 1 == first + robot.positions() || !obstacle.touchable[k + 1] || (away(k) && away(k + 1))) continue;
       if (!edge_clear<kSpace>(obstacle, {from(k), from(k + 1)}, {to(k), to(k + 1)}, longest / 2)) return false;
     }
   }

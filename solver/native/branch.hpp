@@ -130,7 +130,7 @@ class Branch : public Follower<Model::kSpace> {
   double farthest() const;
   bool close_by() const;
   bool passable(double moved) const;
-  bool unswept(const Obstacle<kSpace>& obstacle, int mount, double moved) const;
+  bool unswept(int obstacle, double moved) const;
   void accept();
   void learn();
   void forget();

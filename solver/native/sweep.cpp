@@ -71,6 +71,14 @@ double depth(const Obstacle<D>& obstacle, const Position<D>& point) {
   return radius - std::sqrt(std::max(0.0, radius * (radius + 2 * gap)));
 }
 
+template <int D>
+double distance_outside(const Obstacle<D>& obstacle, double gap) {
+  if (!obstacle.outline.empty()) return 0;
+  if (!quadratic(obstacle) || std::isinf(gap)) return gap;
+  const double radius = obstacle.fineness;
+  return std::sqrt(std::max(0.0, radius * (radius + 2 * gap))) - radius;
+}
+
 // Conservative advancement: as far at a time as the depth leaves, and a little.
 template <int D>
 bool path_clear(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to) {
@@ -119,6 +127,7 @@ double harmless_motion(const Obstacle<D>& obstacle, double longest) {
 
 #define CCR_INSTANTIATE(D)                                                                                 \
   template double depth(const Obstacle<D>&, const Position<D>&);                                           \
+  template double distance_outside(const Obstacle<D>&, double);                                            \
   template bool path_clear(const Obstacle<D>&, const Position<D>&, const Position<D>&);                    \
   template bool edge_clear(const Obstacle<D>&, const Edge<D>&, const Edge<D>&, double);                    \
   template double harmless_path(const Obstacle<D>&);                                                       \

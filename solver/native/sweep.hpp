@@ -9,11 +9,16 @@
 
 namespace ccr {
 
-// How deep a point is in an obstacle, or more; at most 0 outside, and then no nearer than that [mm].
+// How deep a point is in an obstacle, as exactly as its outline is given; at most 0 outside, and then no nearer than that
+// [mm].
 template <int D>
 double depth(const Obstacle<D>& obstacle, const Position<D>& point);
 
-// Whether the straight way between two points outside cuts no deeper into the obstacle than its surface curves away.
+// How far from the obstacle a point of some gap is, or less [mm].
+template <int D>
+double distance_outside(const Obstacle<D>& obstacle, double gap);
+
+// Whether the straight way between two points outside cuts into the obstacle by no more than a little.
 template <int D>
 bool path_clear(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to);
 

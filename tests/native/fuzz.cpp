@@ -1,5 +1,7 @@
-// Random robots, scenes and commands, every step looked at: fuzz SEED SECONDS. Episode k has the seed SEED + k and depends
-// on nothing else, so that `fuzz K 0` shows the one that failed again.
+// Random robots, scenes and commands, every step looked at: fuzz SEED [SECONDS]. Episode k has the seed SEED + k and depends
+// on nothing else; the last one is cut short when the time is up. Without a time it is the one episode of the seed, which
+// shows again what failed.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -14,9 +16,13 @@ namespace ccr::testing {
 namespace {
 
 constexpr int kSteps = 100;            // of an episode
-constexpr double kLeastGap = -1e-12;   // over the length of the robot
+constexpr double kLeastGap = -1e-12;   // over the length of the robot, as is the largest of an active one
 constexpr double kLimitBand = 1e-9;    // by which a tension may be above its limit, as a fraction
 constexpr int kStatuses = 5;
+
+constexpr double kOptimal = 1e-8;      // stationarity and complementarity, without units
+
+using Clock = std::chrono::steady_clock;
 
 std::uint64_t present = 0;  // seed of the episode under way
 
@@ -25,6 +31,8 @@ void tell() { std::fprintf(stderr, "fuzz: failed in the episode of seed %llu\n",
 struct Tally {
   long episodes = 0, steps = 0, touching = 0, iterations = 0;
   long statuses[kStatuses] = {};
+  std::uint64_t seen[kStatuses] = {};  // seed of the episode that met a status last
+  int hardest = 0;  // factorisations of a step
 };
 
 template <int D>
@@ -44,8 +52,15 @@ const char* fault(const Robot& robot, const View<D>& view, int status, const std
   return nullptr;
 }
 
+const char* fault(const ccr::Optimality& found) {
+  if (!(found.gap <= -kLeastGap)) return "an active gap that is open";
+  if (!(found.stationarity <= kOptimal)) return "forces that are not in equilibrium";
+  if (!(found.complementarity <= kOptimal)) return "a contact that pushes from afar";
+  return nullptr;
+}
+
 template <int D>
-bool run(Random& random, Tally& tally) {
+bool run(Random& random, Clock::time_point end, Tally& tally) {
   const RobotNumbers of = random_robot<D>(random);
   const Setting<D> setting = random_setting<D>(random, of, random.integer(1, 6));
   const auto follower = make_follower<D>(setting.robot, static_cast<int>(setting.obstacles.size()));
@@ -53,36 +68,37 @@ bool run(Random& random, Tally& tally) {
   const View<D> view(setting.robot, setting.obstacles.size());
   std::vector<double> now = setting.rest, to = now;
   Commands<D> commands(random, of);
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kSteps && Clock::now() < end; ++step) {
     const std::array<double, D> command = commands.next(now);
     const int status = static_cast<int>(follower->follow(now.data(), command.data(), to.data()));
-    if (const char* why = fault<D>(setting.robot, view, status, to)) {
-      std::fprintf(stderr, "fuzz: %s in step %d (status %d, robot of %.4g mm, %d segments, %s%zu obstacles)\n", why, step,
-                   status, of.length, of.segments, D == 3 ? "space, " : of.sliding ? "sliding, " : "uniform, ",
+    const int iterations = follower->iterations, factorizations = follower->factorizations;
+    const char* why = fault<D>(setting.robot, view, status, to);
+    const Optimality optimality = follower->optimality(to.data());
+    if (!why) why = fault(optimality);
+    if (why) {
+      std::fprintf(stderr, "fuzz: %s in step %d (status %d, robot of %.4g mm, %d segments, %s, %zu obstacles)\n", why, step,
+                   status, of.length, of.segments, D == 3 ? "space" : of.sliding ? "sliding" : "uniform",
                    setting.obstacles.size());
-      if (view.contacts > 0)
-        std::fprintf(stderr, "fuzz: clearance %.3g L, tension %.12g of its limit\n", to[view.clearance] / of.length,
-                     to[view.tensions] / of.max_tension);
+      std::fprintf(stderr, "fuzz: tension %.12g of its limit, stationarity %.3g, gap %.3g L, complementarity %.3g\n",
+                   to[view.tensions] / of.max_tension, optimality.stationarity, optimality.gap, optimality.complementarity);
       return false;
     }
     ++tally.steps;
     ++tally.statuses[status];
-    tally.iterations += follower->iterations;
-    for (int k = 0; k < D; ++k)
-      if (to[view.force + static_cast<std::size_t>(k)] != 0) {
-        ++tally.touching;
-        break;
-      }
+    tally.seen[status] = present;
+    tally.iterations += iterations;
+    tally.hardest = std::max(tally.hardest, factorizations);
+    tally.touching += std::any_of(&to[view.force], &to[view.force] + D, [](double part) { return part != 0; });
     std::swap(now, to);
   }
   return true;
 }
 
-bool run_episode(std::uint64_t seed, Tally& tally) {
+bool run_episode(std::uint64_t seed, Clock::time_point end, Tally& tally) {
   present = seed;
   Random random(seed);
   ++tally.episodes;
-  return random.chance(0.5) ? run<2>(random, tally) : run<3>(random, tally);
+  return random.chance(0.5) ? run<2>(random, end, tally) : run<3>(random, end, tally);
 }
 
 }  // namespace
@@ -90,22 +106,27 @@ bool run_episode(std::uint64_t seed, Tally& tally) {
 
 int main(int count, char** arguments) {
   using namespace ccr::testing;
-  if (count != 3) {
-    std::fprintf(stderr, "usage: fuzz SEED SECONDS\n");
+  if (count < 2 || count > 3) {
+    std::fprintf(stderr, "usage: fuzz SEED [SECONDS]\n");
     return 2;
   }
   if (__sanitizer_set_death_callback) __sanitizer_set_death_callback(tell);
   const std::uint64_t seed = std::strtoull(arguments[1], nullptr, 10);
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(std::atof(arguments[2]));
+  const bool once = count == 2;
+  const auto time = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(once ? 0 : std::atof(arguments[2])));
+  const auto end = once ? Clock::time_point::max() : Clock::now() + time;
   Tally tally;
   do {
-    if (!run_episode(seed + static_cast<std::uint64_t>(tally.episodes), tally)) {
+    if (!run_episode(seed + static_cast<std::uint64_t>(tally.episodes), end, tally)) {
       tell();
       return 1;
     }
-  } while (std::chrono::steady_clock::now() < end);
-  std::printf("fuzz: %ld episodes, %ld steps, %ld of them in contact, %ld iterations; statuses", tally.episodes, tally.steps,
-              tally.touching, tally.iterations);
-  for (const long number : tally.statuses) std::printf(" %ld", number);
+  } while (!once && Clock::now() < end);
+  std::printf("fuzz: %ld episodes, %ld steps, %ld of them in contact, %ld iterations, at most %d factorisations in a step; statuses",
+              tally.episodes, tally.steps, tally.touching, tally.iterations, tally.hardest);
+  for (int k = 0; k < kStatuses; ++k) {
+    std::printf(" %ld", tally.statuses[k]);
+    if (k > 2 && tally.statuses[k] > 0) std::printf(" (seed %llu)", static_cast<unsigned long long>(tally.seen[k]));
+  }
   std::printf("\n");
 }

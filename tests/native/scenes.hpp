@@ -13,34 +13,23 @@
 
 namespace ccr::testing {
 
-// How many shapes there are, compiled ones among them.
-inline constexpr int kShapes = 6;
-
-// A compiled gap law: that of a ball, whose centre and radius are the parameters.
+// How many shapes there are: in the plane, compiled ones among them.
 template <int D>
-int ball_law(const double** in, double** out, int*, double*, int) {
-  const double *point = in[0], *ball = in[1];
-  const double r = ball[D];
-  double square = 0, *to = out[0] + 1;
-  for (int k = 0; k < D; ++k) {
-    const double offset = point[k] - ball[k];
-    square += offset * offset;
-    *to++ = offset / r;
-  }
-  *out[0] = (square - r * r) / (2 * r);
-  for (int row = 0; row < D; ++row)
-    for (int column = row; column < D; ++column) *to++ = row == column ? 1 / r : 0;
+inline constexpr int kShapes = D == 2 ? 6 : 5;
+
+// A compiled gap law: that of a disc, whose centre and radius are the parameters.
+inline int disc_law(const double** in, double** out, int*, double*, int) {
+  const double x = in[0][0] - in[1][0], y = in[0][1] - in[1][1], r = in[1][2];
+  const double gap[] = {(x * x + y * y - r * r) / (2 * r), x / r, y / r, 1 / r, 0, 1 / r};
+  std::copy(std::begin(gap), std::end(gap), out[0]);
   return 0;
 }
 
-template <int D>
-Obstacle<D> make_custom(const Robot& robot, const Position<D>& center, double r, double stiffness = 0) {
-  std::array<double, D + 1> ball;
-  std::copy(center.v.begin(), center.v.end(), ball.begin());
-  ball[D] = r;
-  Obstacle<D> obstacle = make_obstacle<D>(robot, D == 2 ? Shape::kCircle : Shape::kSphere, ball, stiffness);
+inline Obstacle<2> make_custom(const Robot& robot, const Position<2>& center, double r, double stiffness) {
+  Obstacle<2> obstacle = circle(robot, center[0], center[1], r, stiffness);
   obstacle.shape = Shape::kCustom;
-  obstacle.law = ball_law<D>;
+  obstacle.law = disc_law;
+  obstacle.outline = ellipse_outline(std::array{center[0], center[1], r, r, 1.0, 0.0}.data());
   return obstacle;
 }
 
@@ -69,7 +58,7 @@ inline Obstacle<2> random_obstacle(Random& random, const Robot& robot, int shape
       }
       return make_obstacle<2>(robot, Shape::kPolygon, numbers, stiffness);
     }
-    default: return make_custom<2>(robot, at, r, stiffness);
+    default: return make_custom(robot, at, r, stiffness);
   }
 }
 
@@ -91,7 +80,7 @@ inline Obstacle<3> random_obstacle(Random& random, const Robot& robot, int shape
                                            at[1] + r * way[1], at[2] + r * way[2], r});
     case 3:
       return made(Shape::kCylinder, {at[0], at[1], at[2], way[0], way[1], way[2], r - edge, r * random.uniform(1, 2) - edge, edge});
-    case 4: {
+    default: {
       Vec<3> second = cross(way, random.direction<3>());
       const double size = norm(second);
       for (double& part : second.v) part /= size;
@@ -99,7 +88,6 @@ inline Obstacle<3> random_obstacle(Random& random, const Robot& robot, int shape
       return made(Shape::kBox, {at[0], at[1], at[2], way[0], way[1], way[2], second[0], second[1], second[2], third[0], third[1],
                                 third[2], r - edge, r * random.uniform(1, 2) - edge, r - edge, edge});
     }
-    default: return make_custom<3>(robot, at, r, stiffness);
   }
 }
 
@@ -156,7 +144,7 @@ struct View {
 template <int D>
 Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, double springs = 0.2) {
   Setting<D> out{make_robot<D>(of), {}, {}};
-  const double spacing = of.length / (of.segments * (of.between + 1));
+  const double longest = *std::max_element(out.robot.edges.begin(), out.robot.edges.end());
   const auto follower = make_follower<D>(out.robot, 1);
   for (int tries = 0; static_cast<int>(out.obstacles.size()) < count && tries < 200; ++tries) {
     Position<D> at = random.direction<D>();
@@ -165,10 +153,10 @@ Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, dou
     const double size = D == 2 ? 1 : std::hypot(at[0], at[1]);
     for (int k = 0; k < D - 1; ++k) at[k] *= out_of / size;
     at[D - 1] = of.length * random.uniform(0.3, 0.95);
-    const double r = std::max(of.length * random.uniform(0.04, 0.1), 1.1 * spacing);
+    const double r = std::max(of.length * random.uniform(0.04, 0.1), 0.55 * longest);
     const double unit = of.rigidity / (of.length * of.length * of.length);
     const double stiffness = random.chance(springs) ? unit * random.decades(0, 4) : 0;
-    const std::vector<Obstacle<D>> alone = {random_obstacle(random, out.robot, random.integer(0, kShapes - 1), at, r, stiffness)};
+    const std::vector<Obstacle<D>> alone = {random_obstacle(random, out.robot, random.integer(0, kShapes<D> - 1), at, r, stiffness)};
     follower->enter(alone);
     const std::vector<double> rest = rest_block(*follower, of.length);
     if (rest[View<D>(out.robot, 1).clearance] > 1e-3 * of.length) out.obstacles.push_back(alone[0]);

@@ -119,9 +119,12 @@ TEST_CASE("steps in contact allocate nothing, stalls included") {
 TEST_CASE("steps beside every shape allocate nothing") {
   Random random(1);
   const Robot plane = make_robot<2>(prototype()), space = make_robot<3>(prototype());
-  for (int shape = 0; shape < kShapes; ++shape) {
+  for (int shape = 0; shape < kShapes<2>; ++shape) {
     CAPTURE(shape);
     CHECK(twice<2>(prototype(), {random_obstacle(random, plane, shape, Position<2>{{50, 100}}, 12, 0)}, 6).allocated == 0);
+  }
+  for (int shape = 0; shape < kShapes<3>; ++shape) {
+    CAPTURE(shape);
     CHECK(twice<3>(prototype(), {random_obstacle(random, space, shape, Position<3>{{50, 20, 100}}, 12, 0)}, 6).allocated == 0);
   }
 }

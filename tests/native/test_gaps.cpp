@@ -35,7 +35,7 @@ void each_obstacle(std::uint64_t seed, Check check) {
   Random random(seed);
   const Robot robot = make_robot<D>({});
   for (const double scale : kScales)
-    for (int shape = 0; shape < kShapes; ++shape)
+    for (int shape = 0; shape < kShapes<D>; ++shape)
       for (int trial = 0; trial < 10; ++trial) {
         Position<D> at = random.matrix<D>(50 * scale);
         const double r = kSize * scale * random.uniform(0.5, 2);
