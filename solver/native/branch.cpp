@@ -531,16 +531,17 @@ bool Branch<Model>::close_by() const {
 // The branch ends within the smallest step: descend from its end, feasible and slowly, to where the robot goes.
 template <class Model>
 Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
-  const Iterate start = present_;
+  start_ = present_;
   const bool holding = !releases(command);  // the motor
-  const std::vector<Position> start_points = points_, start_mounts = mounts_;
+  start_points_ = points_;
+  start_mounts_ = mounts_;
   const std::size_t start_trace = trace ? trace->size() : 0;
   settled_ = false;
   const auto undo = [&](End reason) {
     newton_.chain.fence(false);
-    present_ = start;
-    points_ = start_points;
-    mounts_ = start_mounts;
+    present_ = start_;
+    points_ = start_points_;
+    mounts_ = start_mounts_;
     if (trace) trace->resize(start_trace);
     settled_ = false;
     settle();
@@ -562,7 +563,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     if (holding && highest(tensions_) > newton_.chain.robot().max_tension) return undo(End::kOverTension);
     double farthest = 0;
     for (std::size_t k = 0; k < points_.size(); ++k)
-      farthest = std::max(farthest, norm(minus(points_[k], start_points[k])));
+      farthest = std::max(farthest, norm(minus(points_[k], start_points_[k])));
     return farthest > kStill * newton_.chain.robot().max_length ? End::kSnapped : End::kPassed;
   }
   return undo(End::kStuck);

@@ -142,6 +142,8 @@ class Branch : public Follower<Model::kSpace> {
   Iterate present_, trial_;
   Trend<Model> trend_;  // of `present_`
   Iterate back_;          // scratch of `returns`
+  Iterate start_;         // of a descent, and its points and mounts
+  std::vector<Position> start_points_, start_mounts_;
   std::vector<typename Model::Control> predicted_;  // controls of `trial_` along the trend
   bool steady_ = false;   // whether there is a trend
   int work_before_ = 0;   // the step began
