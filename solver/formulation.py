@@ -12,6 +12,7 @@ The first two are turned into C when the package is built (:mod:`solver.codegen`
 """
 
 import itertools
+import math
 from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -165,12 +166,15 @@ SERIES_TERMS = 12  # of the series below: to the last digit for a quarter turn
 
 
 def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
-    """``sin h / h`` and ``cos h`` in ``square = h²``, smooth at zero, by their power series for |h| ≤ π/2."""
-    sinc = cosine = 1 + 0 * square
-    for k in reversed(range(1, SERIES_TERMS)):
-        sinc = 1 - square / (2 * k * (2 * k + 1)) * sinc
-        cosine = 1 - square / (2 * k * (2 * k - 1)) * cosine
-    return sinc, cosine
+    """``sin h / h`` and ``cos h`` in ``square = h²``, smooth at zero, by the power series of the first for |h| ≤ π/2.
+
+    The second is ``d(h sinc h)/dh``, with the slope of the series in ``square``.
+    """
+    sinc = slope = 0 * square
+    for k in reversed(range(SERIES_TERMS)):
+        slope = sinc + square * slope
+        sinc = (-1) ** k / math.factorial(2 * k + 1) + square * sinc
+    return sinc, sinc + 2 * square * slope
 
 
 def arc_function() -> ca.Function:

@@ -390,7 +390,7 @@ template <class Model>
 bool Branch<Model>::jumped(const Command& command, double moved) {
   const Chain& chain = newton_.chain;
   if (moved <= kStill * chain.robot().max_length) return false;
-  if (!chain.touching(trial_.active) && !chain.touching(present_.active)) return false;
+  if (!chain.touching(present_.active)) return false;  // a free robot has but one branch
   if (steady_) {
     double turned = 0, missed = 0;
     for (std::size_t i = 0; i < predicted_.size(); ++i)
@@ -401,11 +401,11 @@ bool Branch<Model>::jumped(const Command& command, double moved) {
     if (missed <= kOffTrend * turned) return false;
   }
   if (command.length == present_.command.length) {
-    double exchanged = 0;
+    double bent = 0;  // work that a tension which changes unevenly may take or give
     for (int k = 0; k < kCables; ++k)
-      exchanged += std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
-                   std::max(tensions_[k], trial_tensions_[k]);
-    if (std::abs(lost(command)) * chain.stiffness() <= kLost * exchanged) return false;
+      bent += std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
+              (kUneven * std::abs(trial_tensions_[k] - tensions_[k]) + kLost * std::max(tensions_[k], trial_tensions_[k]));
+    if (std::abs(lost(command)) * chain.stiffness() <= bent) return false;
   }
   return !returns();
 }
