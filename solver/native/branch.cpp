@@ -217,6 +217,8 @@ void Branch<Model>::remember() {
 template <class Model>
 void Branch<Model>::accept() {
   learn();
+  const double limit = newton_.chain.robot().max_tension;
+  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) held_ = present_;
   std::swap(present_, trial_);
   tensions_ = trial_tensions_;
   energy_ = newton_.chain.energy();
@@ -390,7 +392,7 @@ template <class Model>
 bool Branch<Model>::jumped(const Command& command, double moved) {
   const Chain& chain = newton_.chain;
   if (moved <= kStill * chain.robot().max_length) return false;
-  if (!chain.touching(present_.active)) return false;  // a free robot has but one branch
+  if (!chain.touching(present_.active) || tight()) return false;  // a free robot has but one branch, one held tight no room
   if (steady_) {
     double turned = 0, missed = 0;
     for (std::size_t i = 0; i < predicted_.size(); ++i)
@@ -560,7 +562,10 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     settled_ = false;
     forget();
     settle();
-    if (holding && highest(tensions_) > newton_.chain.robot().max_tension) return undo(End::kOverTension);
+    if (highest(tensions_) > newton_.chain.robot().max_tension) {
+      if (holding) return undo(End::kOverTension);
+      held_ = start_;
+    }
     double farthest = 0;
     for (std::size_t k = 0; k < points_.size(); ++k)
       farthest = std::max(farthest, norm(minus(points_[k], start_points_[k])));
@@ -621,12 +626,21 @@ bool Branch<Model>::yield(Command& wanted, double least) const {
   return changed;
 }
 
+// Whether a cable that its motor cannot hold has no more to let out.
+template <class Model>
+bool Branch<Model>::unyielding() const {
+  for (int k = 0; k < kCables; ++k)
+    if (tensions_[k] > newton_.chain.robot().max_tension && present_.command.cables[k] == 0) return true;
+  return false;
+}
+
 // Whether to first order no motion of the robot meets the command: the multipliers that hold it, or that of the gap it
 // would run into, balance each other without the energy of the robot, as they do where the tension grows beyond bounds.
 template <class Model>
 bool Branch<Model>::barred(const Command& command) {
   Chain& chain = newton_.chain;
   ActiveSet holding = present_.active;
+  if (holding.count > 0 && !tight() && std::isfinite(chain.robot().max_tension)) return false;
   if (holding.count == 0) {
     trial_ = present_;
     trial_.command = command;
@@ -662,10 +676,9 @@ bool Branch<Model>::barred(const Command& command) {
 
 // As tensions grow beyond all that a robot needs to bend, its geometry begins to bar it, ever more closely.
 template <class Model>
-double Branch<Model>::smallest_step() const {
+bool Branch<Model>::tight() const {
   const Robot& robot = newton_.chain.robot();
-  const double natural = robot.rigidity / (robot.offset * robot.max_length);
-  return highest(tensions_) > kTight * natural ? kCommandResolution : kSmallestStep;
+  return highest(tensions_) > kTight * robot.rigidity / (robot.offset * robot.max_length);
 }
 
 template <class Model>
@@ -683,6 +696,8 @@ Status Branch<Model>::follow(const Command& target) {
         reached = std::max(reached, Status::kStalled);
         forget();
         yielding *= 2;
+      } else if (unyielding()) {
+        return Status::kStalled;
       }
     } else {
       yielding = kYield;
@@ -701,7 +716,7 @@ Status Branch<Model>::follow(const Command& target) {
     } else if (move == Move::kOverTension) {
       stalled = stalled || approach_limit();
       step = size / 2;
-    } else if (size > smallest_step()) {
+    } else if (size > kSmallestStep || (size > kTightStep && tight() && !barred(next))) {
       step = size / 2;
       refined = true;
     } else {
@@ -759,6 +774,12 @@ Status Branch<Model>::follow(const double* from, const double* target, double* t
     remember();
   }
   const Status status = follow(wanted);
+  if (highest(tensions_) > newton_.chain.robot().max_tension) {  // amid a yield
+    present_ = held_;
+    settled_ = false;
+    settle();
+    remember();
+  }
   if (!newton_.chain.touching(present_.active)) {
     onset_ = {};
   } else if (!touched_) {

@@ -108,8 +108,9 @@ class Branch : public Follower<Model::kSpace> {
   Command goal(Command wanted) const;
   bool hold(Command& wanted) const;
   bool yield(Command& wanted, double least) const;
+  bool unyielding() const;
   bool barred(const Command& command);
-  double smallest_step() const;
+  bool tight() const;
   double apart(const Command& a, const Command& b) const;
   double travelled(const Command& from, const Command& to) const;
   bool spent() const { return newton_.work() - work_before_ > limits::kWork; }
@@ -142,6 +143,7 @@ class Branch : public Follower<Model::kSpace> {
   Iterate present_, trial_;
   Trend<Model> trend_;  // of `present_`
   Iterate back_;          // scratch of `returns`
+  Iterate held_;          // the last equilibrium that the motors held
   Iterate start_;         // of a descent, and its points and mounts
   std::vector<Position> start_points_, start_mounts_;
   std::vector<typename Model::Control> predicted_;  // controls of `trial_` along the trend

@@ -76,6 +76,7 @@ inline constexpr int kOnsetBisections = 20;     // to find where a contact began
 // Stall: the cable stops where the tension is within this fraction below its limit.
 inline constexpr double kTensionBand = 1e-6;
 inline constexpr double kTight = 100.0;         // tension over EI / aL from which ever smaller steps are tried
+inline constexpr double kTightStep = 1e-11;     // the smallest of them [a]
 inline constexpr double kBarred = 1e-5;         // what is left of forces that balance each other
 inline constexpr double kPeakStep = 1.25e-3;    // no peak of the tension is looked for within a step this small [a]
 inline constexpr double kYield = 0.0025;        // displacement a motor gives at a time when it cannot hold [a]

@@ -142,14 +142,14 @@ def test_a_release_relieves_while_the_other_cable_is_pulled():
 def test_nothing_is_lost_where_the_way_is_blocked(robot, walk):
     """In a narrow shaft the robot stalls, or is blocked where its motors hold everything, and still lets go."""
     shaft = Scene(HalfSpace(point=(x, y, 0), normal=(-x, -y, 0)) for x, y in ((9.5, 0), (-9.5, 0), (0, 9.5), (0, -9.5)))
-    for limit, status in ((15.0, Status.STALLED), (math.inf, Status.BLOCKED)):
+    for limit, statuses in ((15.0, {Status.STALLED}), (math.inf, {Status.BLOCKED, Status.GAVE_UP})):
         solver = SpatialSolver(replace(robot, max_tension=limit), shaft)
         stuck = walk(solver, ((k / 2, 0.1 * k) for k in range(1, 25)))
-        assert stuck.status is status
+        assert stuck.status in statuses
         assert stuck.contact.any(axis=(1, 2)).all()
         assert max(stuck.residuals()) < 1e-8
         released = solver.step(stuck, stuck.cables_mm - 1)
-        assert released.status is not Status.BLOCKED
+        assert released.status in (Status.CONVERGED, Status.SNAPPED)
         assert released.cables_mm == pytest.approx(stuck.cables_mm - 1)
 
 
