@@ -47,7 +47,7 @@ class EquilibriumOutputs(torch.autograd.Function):
 
 
 def _followed(equilibrium: Equilibrium, row: int, value: float) -> bool:
-    """Whether the equilibrium is where a value commands; a stalled or jammed robot is not."""
+    """Whether the equilibrium is where a value commands; a stalled or blocked robot is not."""
     reached = {CABLE: equilibrium.cable_mm, LENGTH: equilibrium.length_mm}.get(row, value)
     return bool(np.isclose(reached, value, rtol=1e-6, atol=0))
 
@@ -62,7 +62,7 @@ def differentiable(
     """Node poses, tensions and contact forces of a batch, with gradients in the values they were solved for.
 
     Each equilibrium is the answer of a solver. Along a branch it depends on the last command and the obstacles only;
-    where the robot could not follow a command (a stall or jam) it does not depend on it, and the gradient vanishes.
+    where the robot could not follow a command (it stalled or was blocked) it does not depend on it, and the gradient vanishes.
 
     Args:
         values: What each was solved for, ``(b, k)`` on the CPU, or ``(b,)`` for one value each.

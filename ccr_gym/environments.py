@@ -19,7 +19,7 @@ from ccr_gym.tasks import (
 from ccr_gym.vector_env import ContactVectorEnv
 
 FOUND = (
-    "drawn again until the straight robot is clear of it and a steady pull reaches the set-point without a stall, jam "
+    "drawn again until the straight robot is clear of it and a steady pull reaches the set-point without a stall, block "
     "or snap."
 )
 CIRCLE = (
@@ -142,7 +142,7 @@ class SpatialPushEnv(TaskEnv):  # noqa: D101 - below
         "The straight robot, cables slack. The obstacle stands at a uniform azimuth, its centre 35–65 mm off the axis "
         "and 80–150 mm high, its radius uniform in 10–16 mm; half of them are cylinders of 60 mm across the way of "
         "the robot, tilted by up to 30°. The set-point is uniform in 20–150 mN, drawn again until a steady pull "
-        "towards the obstacle reaches it without a stall, jam or snap. With `force_vector` that pull is up to 0.25 "
+        "towards the obstacle reaches it without a stall, block or snap. With `force_vector` that pull is up to 0.25 "
         "rad aside of the obstacle, and the force it gets to is the set-point.",
         action="increments of both signed displacements as fractions of `max_increment_mm`; a positive displacement "
         "pulls the first cable of a pair, a negative one the opposite cable",

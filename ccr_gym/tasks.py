@@ -336,7 +336,7 @@ def assign(
 ) -> tuple[np.ndarray, list[Assignment]]:
     """Give some robots scenes and desired forces, each drawn by its own generator.
 
-    Draws again until the force can be reached by pulling steadily, without a stall, jam or snap on the way.
+    Draws again until the force can be reached by pulling steadily, without a stall, block or snap on the way.
 
     Args:
         task: Where scenes and forces are drawn from.
