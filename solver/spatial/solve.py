@@ -58,7 +58,7 @@ class SpatialSolver:
 
         Returns:
             The equilibrium reached; its ``status`` says how. While anything touches, the cables are not slackened
-            together below a pretension of 0.05 mm, where the shape would be undetermined.
+            together below a pretension of a/160, where the shape would be undetermined.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.

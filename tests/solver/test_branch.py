@@ -215,3 +215,43 @@ def test_a_tip_that_rolls_onto_a_circle_is_not_taken_for_blocked(x, release):
     assert Status.SNAPPED in statuses
     assert statuses <= {Status.CONVERGED, Status.SNAPPED}
     assert certified(state)
+
+
+SMALL_SNAPS = [  # cable, circles, where the step of 0.5 mm begins and ends [mm]
+    ("sliding", ((61.960395, 140.412247, 11.092004), (45.735903, 82.051608, 10.097247)), 10.5, 10.0),
+    (
+        "uniform",
+        ((56.417880, 127.799052, 15.862201), (72.076162, 144.512886, 12.462216), (56.428765, 80.038946, 10.286344)),
+        11.0,
+        11.5,
+    ),
+]
+
+
+@pytest.mark.parametrize(("cable", "obstacles", "start", "end"), SMALL_SNAPS, ids=["released", "pulled"])
+def test_a_small_snap_within_a_step_is_told(cable, obstacles, start, end, circles, pulls):
+    """Of 1.4 and 2.4 mm, no more than the robot moves along its branch in the same step."""
+    solver = Solver(replace(Robot.prototype(), cable=cable), circles(*obstacles))
+    before = walk(solver, solver.rest(), pulls(start, 0.5))
+    fine, statuses = before, set()
+    for part in np.linspace(start, end, 101)[1:]:
+        after = solver.step(fine, float(part))
+        statuses.add(after.status)
+        fine = after
+    assert Status.SNAPPED in statuses
+    coarse = solver.step(before, end)
+    assert coarse.status is Status.SNAPPED
+    assert coarse.nodes == pytest.approx(fine.nodes, abs=1e-8)
+
+
+@pytest.mark.parametrize("cable", ["uniform", "sliding"])
+def test_a_large_step_ends_where_small_ones_do(cable, random_scene):
+    generator = np.random.default_rng(11)
+    for _ in range(12):
+        solver = Solver(replace(Robot.prototype(), cable=cable), random_scene(generator))
+        equilibrium = solver.rest()
+        for change in generator.choice([-0.5, 0.5], 24, p=[0.3, 0.7]):
+            cable_mm = float(np.clip(equilibrium.cable_mm + change, 0, 14))
+            fine = walk(solver, equilibrium, np.linspace(equilibrium.cable_mm, cable_mm, 26)[1:].tolist())
+            equilibrium = solver.step(equilibrium, cable_mm)
+            assert equilibrium.nodes == pytest.approx(fine.nodes, abs=1e-6)
