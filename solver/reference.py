@@ -21,7 +21,7 @@ from solver.solve import check_clear, check_command, check_core, check_scene
 from solver.status import Status
 
 # Displacements of the cable are over its offset a, places over the length L of the robot at its longest.
-LARGEST_STEP, SMALLEST_STEP = 0.03, 0.004  # of one solve, and of its last try [a]
+LARGEST_STEP, SMALLEST_STEP = 0.03125, 0.00375  # of one solve, and of its last try [a]
 INSERTION = 11.25  # displacement that counts as much as an insertion by L [a]
 PRETENSION = 0.00625  # a touching robot is not slackened below it [a]
 SLACK = 1.25e-4  # below it a shear costs too little for IPOPT, and the robot is taken as free [a]

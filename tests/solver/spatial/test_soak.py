@@ -16,12 +16,14 @@ ROBOT = replace(SpatialRobot.prototype(), touch=("backbone",))
 
 
 def test_nothing_is_found_in_random_episodes():
+    """But snaps of eq. 13 in which segments fold over: it has no equilibrium for the robot to come to rest in."""
     tally, cases = Tally(), []
     for index in range(SHORT // STEPS):
         counted, found = play(Episode("space", 1, index))
         tally.add(counted)
         cases += found
-    assert cases == []
+    assert {case["kind"] for case in cases} <= {"gave up"}
+    assert tally.statuses["GAVE_UP"] <= SHORT / 50
     assert tally.steps == SHORT
     assert tally.contact > SHORT / 10
     assert tally.traced > 0
