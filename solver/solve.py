@@ -87,7 +87,7 @@ class Solver:
         Returns:
             The equilibrium reached; its ``status`` says how. While anything touches, a uniform cable is not slackened
             below a pretension of 0.00625 of ``robot.offset_mm``, where the shape would be undetermined; without it such
-            a robot is blocked where insertion meets an obstacle.
+            a robot is given up on where insertion meets an obstacle.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.

@@ -706,7 +706,7 @@ Status Branch<Model>::follow(const Command& target) {
     const double remaining = apart(present_.command, goal);
     if (remaining == 0) return reached;
     bool stalled = kCables == 1 && at_limit() && pulls(goal) && goal.length == present_.command.length;
-    const double size = std::min(step, remaining);
+    const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
     const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
     const Move move = stalled ? Move::kOverTension : attempt(next);
     if (move == Move::kAccepted) {

@@ -23,7 +23,7 @@ def test_nothing_is_found_in_random_episodes():
         tally.add(counted)
         cases += found
     assert {case["kind"] for case in cases} <= {"gave up"}
-    assert tally.statuses["GAVE_UP"] <= SHORT / 50
+    assert len({tuple(case["episode"]) for case in cases}) <= SHORT // STEPS // 3  # it goes on from there in vain
     assert tally.steps == SHORT
     assert tally.contact > SHORT / 10
     assert tally.traced > 0
