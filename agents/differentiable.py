@@ -62,7 +62,8 @@ def differentiable(
     """Node poses, tensions and contact forces of a batch, with gradients in the values they were solved for.
 
     Each equilibrium is the answer of a solver. Along a branch it depends on the last command and the obstacles only;
-    where the robot could not follow a command (it stalled or was blocked) it does not depend on it, and the gradient vanishes.
+    where the robot could not follow a command (it stalled or was blocked) it does not depend on it, and the gradient
+    vanishes.
 
     Args:
         values: What each was solved for, ``(b, k)`` on the CPU, or ``(b,)`` for one value each.

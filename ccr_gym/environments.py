@@ -19,8 +19,8 @@ from ccr_gym.tasks import (
 from ccr_gym.vector_env import ContactVectorEnv
 
 FOUND = (
-    "drawn again until the straight robot is clear of it and a steady pull reaches the set-point without a stall, block "
-    "or snap."
+    "drawn again until the straight robot is clear of it and a steady pull reaches the set-point without a stall, "
+    "block or snap."
 )
 CIRCLE = (
     "The straight robot, cable slack. The obstacle's centre is uniform in 35–75 × 75–150 mm, its radius in 10–16 mm, "
