@@ -787,8 +787,12 @@ Status Branch<Model>::follow(const double* from, const double* target, double* t
     settled_ = false;
   }
   settle();
-  store(to);
   factorizations = newton_.work() - work_before_;
+  if (!std::isfinite(newton_.chain.objective())) {  // the coordinates it began with are none a robot can have
+    if (to != from) std::copy_n(from, block_size(), to);
+    return Status::kGaveUp;
+  }
+  store(to);
   return status;
 }
 

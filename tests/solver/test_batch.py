@@ -272,3 +272,15 @@ def test_robots_whose_rest_was_cut_short_do_not_move_until_they_rest(monkeypatch
     batch.rest([1])
     batch.step(np.full(3, 9.0))
     assert batch.blocks[:, 0].tolist() == [9.0, 9.0, 9.0]
+
+
+def test_a_block_that_no_robot_can_have_stays_as_it_is():
+    batch = BatchSolver(Robot.prototype(), 1, 0)
+    batch.assign(0, Scene())
+    batch.rest([0])
+    batch.blocks[:] = 1e300
+    batch.blocks[0, batch.layout.length_at] = 180.0
+    written = batch.blocks.copy()
+    batch.step(np.array([4.0]))
+    assert batch.statuses[0] == Status.GAVE_UP
+    assert np.array_equal(batch.blocks, written)
