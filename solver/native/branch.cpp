@@ -320,7 +320,9 @@ bool Branch<Model>::unswept(int j, double moved) const {
   const double path = harmless_path(obstacle);
   const auto from = [&](int k) { return minus(points_[k], before); };
   const auto to = [&](int k) { return minus(chain.points()[k], now); };
-  const auto away = [&](int k) { return distance_outside(obstacle, gaps[k]) >= moved; };  // all the way
+  const auto away = [&](int k) {  // all the way; a gap out of reach is not measured
+    return std::isfinite(gaps[k]) ? distance_outside(obstacle, gaps[k]) >= moved : clearance_beyond(obstacle, to(k), moved) > 0;
+  };
   for (int line = 0, first = 0; line < static_cast<int>(robot.lines.size()); ++line, first += robot.positions()) {
     const double longest = robot.edges[line];
     const bool edges = moved > harmless_motion(obstacle, longest);
