@@ -25,4 +25,8 @@ class Status(IntEnum):
     The tension grows without bound on the way to such a place, so that a finite limit stalls the robot first.
     """
     GAVE_UP = 4
-    """The solver's budget of work ran out; the last valid equilibrium on the way is kept."""
+    """No equilibrium was found to go on to; the last valid one on the way is kept.
+
+    A bound on work or motion ended the search. In the paper's models a snap may also lead to where a segment would fold
+    over, short of which there is none.
+    """
