@@ -215,10 +215,16 @@ void Branch<Model>::remember() {
 }
 
 template <class Model>
+void Branch<Model>::hold_last(const Iterate& held) {
+  held_ = held;
+  exceeded_ = true;
+}
+
+template <class Model>
 void Branch<Model>::accept() {
   learn();
   const double limit = newton_.chain.robot().max_tension;
-  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) held_ = present_;
+  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) hold_last(present_);
   std::swap(present_, trial_);
   tensions_ = trial_tensions_;
   energy_ = newton_.chain.energy();
@@ -566,7 +572,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
     settle();
     if (highest(tensions_) > newton_.chain.robot().max_tension) {
       if (holding) return undo(End::kOverTension);
-      held_ = start_;
+      hold_last(start_);
     }
     double farthest = 0;
     for (std::size_t k = 0; k < points_.size(); ++k)
@@ -766,6 +772,7 @@ template <class Model>
 Status Branch<Model>::follow(const double* from, const double* target, double* to) {
   iterations = 0;
   work_before_ = newton_.work();
+  exceeded_ = false;
   load(from);
   const Command start = present_.command;
   Command wanted;
@@ -776,7 +783,7 @@ Status Branch<Model>::follow(const double* from, const double* target, double* t
     remember();
   }
   const Status status = follow(wanted);
-  if (highest(tensions_) > newton_.chain.robot().max_tension) {  // amid a yield
+  if (exceeded_ && highest(tensions_) > newton_.chain.robot().max_tension) {  // amid a yield
     present_ = held_;
     settled_ = false;
     settle();
@@ -789,7 +796,7 @@ Status Branch<Model>::follow(const double* from, const double* target, double* t
     settled_ = false;
   }
   settle();
-  factorizations = newton_.work() - work_before_;
+  factorizations = static_cast<int>(newton_.work() - work_before_);
   if (!std::isfinite(newton_.chain.objective())) {  // the coordinates it began with are none a robot can have
     if (to != from) std::copy_n(from, block_size(), to);
     return Status::kGaveUp;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -133,6 +134,7 @@ class Branch : public Follower<Model::kSpace> {
   bool passable(double moved) const;
   bool unswept(int obstacle, double moved) const;
   void accept();
+  void hold_last(const Iterate& held);
   void learn();
   void forget();
   void predict();
@@ -143,12 +145,13 @@ class Branch : public Follower<Model::kSpace> {
   Iterate present_, trial_;
   Trend<Model> trend_;  // of `present_`
   Iterate back_;          // scratch of `returns`
-  Iterate held_;          // the last equilibrium that the motors held
+  Iterate held_;          // the last equilibrium of the step that the motors held, where a later one was not
+  bool exceeded_ = false; // whether there is one
   Iterate start_;         // of a descent, and its points and mounts
   std::vector<Position> start_points_, start_mounts_;
   std::vector<typename Model::Control> predicted_;  // controls of `trial_` along the trend
   bool steady_ = false;   // whether there is a trend
-  int work_before_ = 0;   // the step began
+  std::int64_t work_before_ = 0;  // the step began
   double energy_ = 0;     // at `present_`
   Tensions tensions_{}, trial_tensions_{};
   Tensions onset_{};      // tensions where the present contact began

@@ -2,6 +2,7 @@
 // displacements of the mounted obstacles by the Schur complement that is left.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -42,7 +43,7 @@ class Hessian {
   // H⁻¹ times the slope of a gap, or -H⁻¹ times that of the Lagrangian.
   void respond(const Chain& chain, std::span<const Load> loads);
 
-  int factorizations = 0;  // so far
+  std::int64_t factorizations = 0;  // so far
   double penalty(int j) const { return penalty_[j]; }  // on an active gap, in their order
   double steepest() const { return steepest_; }        // largest curvature of a control
 

@@ -24,7 +24,7 @@ void Newton<Model>::enter(std::span<const Obstacle<Model::kSpace>> obstacles) {
   chain.enter(obstacles);
   const int segments = chain.robot().segments, mounts = chain.mounts();
   if (step_.mounts.size() == static_cast<std::size_t>(mounts)) return;
-  const int work = this->work();
+  const std::int64_t work = this->work();
   hessian_ = Hessian<Model>(segments, mounts);
   hessian_.factorizations = work;
   contacts_ = Contacts<Model>(segments, mounts);

@@ -37,7 +37,7 @@ class Newton {
   bool restore(Iterate& at);
 
   // Factorisations of the Hessian so far, which nearly all of the work goes with.
-  int work() const { return hessian_.factorizations; }
+  std::int64_t work() const { return hessian_.factorizations; }
 
   Chain<Model> chain;  // evaluated at the last iterate
 
