@@ -5,6 +5,7 @@ from dataclasses import fields
 import gymnasium
 import numpy as np
 import pytest
+from comparison import same
 from gymnasium.envs.registration import load_env_creator
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -53,19 +54,6 @@ def build(env_id, count, /, **kwargs):
         return gymnasium.make(env_id, disable_env_checker=True, **kwargs).unwrapped
     kwargs = {"count": count} | kwargs
     return gymnasium.make_vec(env_id, kwargs.pop("count"), vectorization_mode="vector_entry_point", **kwargs)
-
-
-def same(first, second):
-    """Equal structure and bits."""
-    if isinstance(first, dict):
-        assert first.keys() == second.keys()
-        for key in first:
-            same(first[key], second[key])
-    elif isinstance(first, tuple):
-        for one, other in zip(first, second, strict=True):
-            same(one, other)
-    else:
-        assert np.array_equal(first, second)
 
 
 def named(error, *words):

@@ -2,12 +2,12 @@
 
 import contextlib
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import gymnasium
 import numpy as np
 import pytest
+from comparison import same
 
 import ccr_gym
 from ccr_gym import ContactEnv, ContactVectorEnv, RewardWeights, Sensing, Task
@@ -29,19 +29,6 @@ def make(env_id=PUSH, **kwargs):
 
 def make_vec(env_id=PUSH, count=3, **kwargs):
     return gymnasium.make_vec(env_id, count, vectorization_mode="vector_entry_point", **kwargs)
-
-
-def same(first, second):
-    """Equal structure and bits."""
-    if isinstance(first, Mapping):
-        assert first.keys() == second.keys()
-        for key in first:
-            same(first[key], second[key])
-    elif isinstance(first, tuple):
-        for one, other in zip(first, second, strict=True):
-            same(one, other)
-    else:
-        assert np.array_equal(first, second)
 
 
 def scene_of(env_id, count=1):
