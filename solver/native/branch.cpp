@@ -365,6 +365,7 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   }
   const double moved = farthest(), length = newton_.chain.robot().max_length, size = apart(present_.command, command);
   const bool contact = newton_.chain.touching(trial_.active) || newton_.chain.touching(present_.active);
+  if (size > kMeetingStep && meets_narrow()) return Move::kRejected;
   const double allowed = contact ? std::min(kMoveOffset + kMoveSlope * size, kMoveLargest) : kMoveLargest;
   if (moved > length * allowed || !passable(moved)) return Move::kRejected;
   newton_.chain.reduced_gradient(trial_.active);
@@ -380,6 +381,21 @@ Branch<Model>::Move Branch<Model>::attempt(const Command& command) {
   const double hump = std::max(0.0, -lost(command)) * 2 * newton_.chain.stiffness() / (size * newton_.chain.robot().offset);
   const bool peaks = pulled && std::max(tension, highest(tensions_)) + hump > limit;
   return peaks && size > kPeakStep ? Move::kRejected : Move::kAccepted;
+}
+
+// Whether between `present_` and `trial_` an obstacle was met that is narrower than the distance of neighbouring points:
+// which of them meets it first decides where the robot goes from there.
+template <class Model>
+bool Branch<Model>::meets_narrow() const {
+  const Chain& chain = newton_.chain;
+  const std::vector<double>& edges = chain.robot().edges;
+  const double spacing = *std::min_element(edges.begin(), edges.end());
+  const ActiveSet &before = present_.active, &now = trial_.active;
+  const auto begin = before.contact.begin(), end = begin + before.count;
+  return std::any_of(now.contact.begin(), now.contact.begin() + now.count, [&](int contact) {
+    return contact < chain.contacts() && chain.obstacles()[contact / points_.size()].inradius < spacing &&
+           std::find(begin, end, contact) == end;
+  });
 }
 
 // Energy that is not accounted for by the work of the cables, their tension taken to change evenly on the way from

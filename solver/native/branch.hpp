@@ -119,6 +119,7 @@ class Branch : public Follower<Model::kSpace> {
   double lost(const Command& command) const;
   bool jumped(const Command& command, double moved);
   bool returns();
+  bool meets_narrow() const;
   bool attempt_free();
   bool approach_limit();
   bool at_limit() const;

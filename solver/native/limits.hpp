@@ -51,6 +51,7 @@ inline constexpr double kMeasureDamping = 1.0; // where closeness of shapes is m
 inline constexpr double kPretension = 0.00625;  // displacement below which a touching robot is not slackened [a]
 inline constexpr double kInsertion = 11.25;     // displacement [a] that counts as much as an insertion by L
 inline constexpr double kLargestStep = 0.09375; // of one sub-step [a]
+inline constexpr double kMeetingStep = 0.01;     // of one in which a narrow obstacle is met
 inline constexpr double kSmallestStep = 1.25e-5;
 inline constexpr double kPatientStep = 1e-4;    // within which Newton's method may begin with damped iterations
 inline constexpr double kMoveOffset = 0.0028;   // a point moves at most kMoveOffset + kMoveSlope * |step| in a sub-step
