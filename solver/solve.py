@@ -16,6 +16,7 @@ from solver.robot import AnyRobot, Robot
 from solver.scene import Scene
 from solver.validation import instance, number, shown
 
+REASONS = ("", "folded", "work", "stuck")
 SPRINGS = (1e-10, 1e10)  # stiffness of an obstacle's spring, over EI/L³ of the robot
 
 
@@ -27,20 +28,25 @@ class Trace(NamedTuple):
             point, ``(k, n+1, 3)`` [mm].
         points: The points that can touch, by line and position, ``(k, p, j, d)`` [mm].
         displacements: How far each obstacle has been pushed from its place, ``(k, m, d)`` [mm].
+        reason: Why the step was given up, empty where it was not: ``"folded"`` where a snap leads to where a segment
+            folds over, ``"work"`` where its budget of work was spent, ``"stuck"`` where the descent found no way on.
     """
 
     nodes: np.ndarray
     points: np.ndarray
     displacements: np.ndarray
+    reason: str
 
 
-def read_trace(numbers: list[float], robot: AnyRobot, scene: Scene, space: int) -> Trace:
+def read_trace(traced: tuple[list[float], int], robot: AnyRobot, scene: Scene, space: int) -> Trace:
     """The shapes that the kernel has written one after the other."""
     parts = ((robot.segments + 1, 3), (len(robot.lines_mm), robot.positions, space), (len(scene), space))
     ends = np.cumsum([math.prod(part) for part in parts])
+    numbers, reason = traced
     rows = np.reshape(numbers, (-1, int(ends[-1])))
     columns = np.split(rows, ends[:-1], axis=1)
-    return Trace(*(column.reshape(-1, *part) for column, part in zip(columns, parts, strict=True)))
+    shapes = (column.reshape(-1, *part) for column, part in zip(columns, parts, strict=True))
+    return Trace(*shapes, REASONS[reason])
 
 
 class Solver:

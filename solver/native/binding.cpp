@@ -143,13 +143,13 @@ class Kernel {
     return {static_cast<int>(status), branch_->iterations, branch_->factorizations};
   }
 
-  std::vector<double> trace(const Input& from, const Numbers<D>& command) {
+  std::tuple<std::vector<double>, int> trace(const Input& from, const Numbers<D>& command) {
     expect(from);
     std::vector<double> shapes, to(branch_->block_size());
     branch_->trace = &shapes;
     branch_->follow(from.data(), command.data(), to.data());
     branch_->trace = nullptr;
-    return shapes;
+    return {std::move(shapes), static_cast<int>(branch_->reason)};
   }
 
   std::array<double, 3> optimality(const Input& block) {
@@ -288,7 +288,7 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
            "robot"_a, "scene"_a)
       .def_prop_ro("block_size", &Kernel<D>::block_size, "Length of an equilibrium's block.")
       .def("trace", &Kernel<D>::trace, "from_"_a, "command"_a,
-           "Every shape accepted on the way: three numbers of each node, the points that can touch, displacements of the obstacles.")
+           "Every shape accepted on the way: three numbers of each node, the points that can touch, displacements of the obstacles; and why the step was given up.")
       .def("optimality", &Kernel<D>::optimality, "block"_a, "Stationarity, gap and complementarity, without units.");
   constexpr const char* step = "Follow the branch from one block to a command into another; (status, iterations, factorizations).";
   if constexpr (D == 2)

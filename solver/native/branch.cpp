@@ -575,13 +575,15 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
   };
 
   newton_.chain.fence(true);
-  bool moved = newton_.measure(present_) && leave(command);
+  bool moved = newton_.measure(present_) && leave(command), folded = false;
   for (int i = 0; i < kDescentIterations && moved && !spent(); ++i) {
     std::swap(present_, trial_);
     remember();
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && finish();
-    if (!finished && !descend(moved)) continue;
-    if (!finished && newton_.chain.at_fence() && !finish()) break;
+    const bool ended = finished || descend(moved);
+    folded = !finished && newton_.chain.at_fence();
+    if (!ended) continue;
+    if (folded && !finish()) break;
     newton_.chain.fence(false);
     settled_ = false;
     forget();
@@ -595,6 +597,7 @@ Branch<Model>::End Branch<Model>::pass_end(const Command& command) {
       farthest = std::max(farthest, norm(minus(points_[k], start_points_[k])));
     return farthest > kStill * newton_.chain.robot().max_length ? End::kSnapped : End::kPassed;
   }
+  reason = spent() ? Reason::kWork : folded ? Reason::kFolded : Reason::kStuck;
   return undo(End::kStuck);
 }
 
@@ -758,6 +761,7 @@ Status Branch<Model>::follow(const Command& target) {
       forget();
     }
   }
+  reason = Reason::kWork;
   return Status::kGaveUp;
 }
 
@@ -787,6 +791,7 @@ Branch<Model>::Tensions Branch<Model>::first_tensions(const Command& start) {
 template <class Model>
 Status Branch<Model>::follow(const double* from, const double* target, double* to) {
   iterations = 0;
+  reason = Reason::kNone;
   work_before_ = newton_.work();
   exceeded_ = false;
   load(from);

@@ -15,6 +15,10 @@ namespace ccr {
 // How a step ended; of several, the last one.
 enum class Status { kConverged, kSnapped, kStalled, kBlocked, kGaveUp };
 
+// Why a step was given up: a descent led to where a segment folds over, the work of a step was spent, or a descent could
+// not go on.
+enum class Reason { kNone, kFolded, kWork, kStuck };
+
 // How far an equilibrium is from meeting its conditions, without units: the largest slope of the Lagrangian in a control
 // [rad²], the largest gap that is violated, or open and active, over the robot's length, and the largest product of a
 // multiplier and its gap [rad²].
@@ -54,6 +58,7 @@ class Follower {
   virtual Optimality optimality(const double* block) = 0;
 
   int iterations = 0;      // of Newton's method in the last follow
+  Reason reason = Reason::kNone;  // why it gave up
   int factorizations = 0;  // of its Hessian
   // When set, receives of every accepted shape the three numbers of every node, the points that can touch, and the
   // displacements of the obstacles.
@@ -87,6 +92,7 @@ class Branch : public Follower<Model::kSpace> {
 
   using Follower<kSpace>::iterations;
   using Follower<kSpace>::factorizations;
+  using Follower<kSpace>::reason;
   using Follower<kSpace>::trace;
 
   Branch(const Robot& robot, int obstacles);

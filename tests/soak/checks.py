@@ -34,7 +34,7 @@ class Finding(NamedTuple):
 def check(solver, taken, tally, offset=0):
     """Everything that must not happen and did; what was measured is added to the tally."""
     findings = _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
-    findings += _blocked(solver, taken, tally) + _cores(solver, taken, tally)
+    findings += _gave_up(solver, taken, tally) + _blocked(solver, taken, tally) + _cores(solver, taken, tally)
     tally.findings.update(finding.kind for finding in findings)
     return findings
 
@@ -49,7 +49,6 @@ def _states(solver, taken, tally):
     edges = np.linalg.norm(np.diff(_points(states), axis=2), axis=-1).max(axis=2) / robot.edges_mm
     tension = np.array([np.max(_tensions(state)) for state in states]) / robot.max_tension
     work = np.array([state.factorizations for state in states])
-    gave_up = np.array([state.status == Status.GAVE_UP for state in states])
     tally.least_gap = min(tally.least_gap, least.min(initial=math.inf))
     tally.least_distance = min(tally.least_distance, inside.min(initial=math.inf))
     tally.most_tension = max(tally.most_tension, tension.max())
@@ -61,7 +60,6 @@ def _states(solver, taken, tally):
         *_first("edge", edges.max(axis=1) > 1 + ROUNDOFF, edges.max(axis=1)),
         *_first("tension", tension > 1 + BAND, tension),
         *_first("factorizations", work > MOST_FACTORIZATIONS, work),
-        *_first("gave up", gave_up, work),
     ]
 
 
@@ -125,6 +123,15 @@ def certificate(state):
         residuals.complementarity,
         residuals.sign * length,
     )
+
+
+def _gave_up(solver, taken, tally):
+    """Steps given up for another reason than that the paper's models end where a segment folds over."""
+    gave_up = np.flatnonzero([state.status == Status.GAVE_UP for state in taken.states[1:]])
+    reasons = [_trace(solver, taken.states[k], taken.commands[k]).reason for k in gave_up]
+    tally.reasons.update(reasons)
+    unexplained = [(k, reason) for k, reason in zip(gave_up.tolist(), reasons, strict=True) if reason != "folded"]
+    return [Finding(f"gave up: {reason}", k, taken.states[k + 1].factorizations) for k, reason in unexplained[:1]]
 
 
 def _blocked(solver, taken, tally):
@@ -191,8 +198,11 @@ def _traced(solver, core, taken, steps):
 
 def accepted(solver, state, command):
     """Points, and displacements of obstacles, of all shapes accepted on the way of a step, with the first and last."""
-    if isinstance(solver.robot, Robot):
-        trace = solver.trace(state, float(command[0]), float(command[1]))
-    else:
-        trace = solver.trace(state, command[:2])
+    trace = _trace(solver, state, command)
     return trace.points, trace.displacements
+
+
+def _trace(solver, state, command):
+    if isinstance(solver.robot, Robot):
+        return solver.trace(state, float(command[0]), float(command[1]))
+    return solver.trace(state, command[:2])

@@ -18,6 +18,7 @@ class Tally:
     steps: int = 0
     contact: int = 0
     statuses: Counter = field(default_factory=Counter)
+    reasons: Counter = field(default_factory=Counter)
     kinds: Counter = field(default_factory=Counter)
     findings: Counter = field(default_factory=Counter)
     refused: int = 0
@@ -66,6 +67,7 @@ ROWS = {
     "steps": lambda t: f"{t.steps:,}",
     "in contact": lambda t: f"{t.contact / max(1, t.steps):.1%}",
     **{name.lower(): (lambda t, name=name: f"{t.statuses[name]:,}") for name in Status.__members__},
+    **{f"gave up: {why}": (lambda t, why=why: f"{t.reasons[why]:,}") for why in ("folded", "work", "stuck")},
     "cores swept": lambda t: f"{t.cores_swept}",
     "steps looked at between": lambda t: f"{t.traced:,}",
     "least gap / L": lambda t: f"{t.least_gap:.1e}",
