@@ -20,6 +20,8 @@ INSIDE = 1e-11  # the same by the distances in numpy, which round differently
 ROUNDOFF = 1e-12
 BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
+PRETENSION = 0.00625 * 1.001  # of the offset: a cable let out so far is as good as slack
+ASKED_AGAIN = 10  # times a command is repeated that was given up on
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
 
 
@@ -126,12 +128,37 @@ def certificate(state):
 
 
 def _gave_up(solver, taken, tally):
-    """Steps given up for another reason than that the paper's models end where a segment folds over."""
+    """Steps given up on that nothing explains."""
     gave_up = np.flatnonzero([state.status == Status.GAVE_UP for state in taken.states[1:]])
-    reasons = [_trace(solver, taken.states[k], taken.commands[k]).reason for k in gave_up]
+    reasons = [_reason(solver, taken, k) for k in gave_up]
     tally.reasons.update(reasons)
-    unexplained = [(k, reason) for k, reason in zip(gave_up.tolist(), reasons, strict=True) if reason != "folded"]
-    return [Finding(f"gave up: {reason}", k, taken.states[k + 1].factorizations) for k, reason in unexplained[:1]]
+    unexplained = gave_up[[reason == "unexplained" for reason in reasons]] if reasons else []
+    return [Finding("gave up", k, taken.states[k + 1].factorizations) for k in list(map(int, unexplained))[:1]]
+
+
+def _reason(solver, taken, k):
+    """Why a step was given up on.
+
+    ``folded``: the paper's models end where a segment folds over. ``slack``: a uniform cable without pretension leaves
+    the shape undetermined. ``crossing``: where a signed pair changes hands in contact, the paper's shape jumps.
+    ``far``: the command is too far for the work of one step, and is reached, or another verdict, when asked for again.
+    """
+    state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
+    reason = _trace(solver, taken.states[k], command).reason
+    if reason == "folded":
+        return reason
+    near_zero = PRETENSION * robot.offset_mm
+    pulled = command_of(state)[:-1]
+    if isinstance(robot, Robot):
+        if robot.cable == "uniform" and pulled[0] < near_zero:
+            return "slack"
+    elif np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
+        return "crossing"
+    for _ in range(ASKED_AGAIN):
+        state = step(solver, state, command)
+        if state.status != Status.GAVE_UP:
+            return "far"
+    return "unexplained"
 
 
 def _blocked(solver, taken, tally):

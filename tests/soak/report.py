@@ -63,11 +63,12 @@ class Tally:
         return vars(self) | {"contact_share": self.contact / max(1, self.steps)}
 
 
+REASONS = ("folded", "slack", "crossing", "far", "unexplained")
 ROWS = {
     "steps": lambda t: f"{t.steps:,}",
     "in contact": lambda t: f"{t.contact / max(1, t.steps):.1%}",
     **{name.lower(): (lambda t, name=name: f"{t.statuses[name]:,}") for name in Status.__members__},
-    **{f"gave up: {why}": (lambda t, why=why: f"{t.reasons[why]:,}") for why in ("folded", "work", "stuck")},
+    **{f"gave up: {why}": (lambda t, why=why: f"{t.reasons[why]:,}") for why in REASONS},
     "cores swept": lambda t: f"{t.cores_swept}",
     "steps looked at between": lambda t: f"{t.traced:,}",
     "least gap / L": lambda t: f"{t.least_gap:.1e}",
