@@ -92,6 +92,40 @@ def test_the_end_of_a_long_ellipse_costs_no_more_than_that_of_a_short_one():
     assert long_one <= 3 * short_one
 
 
+# Which of two neighbouring points meets a narrow obstacle does not depend on the size of the steps.
+
+NARROW = {
+    "a circle as wide as the spacing": (
+        Scene([Circle(center=(67.08390469177479, 107.55520394444945), radius=5.023)]),
+        11.951,
+    ),
+    "a circle before the tip": (
+        Scene([Circle(center=(84.39787994466772, 141.13877312057804), radius=5.546074491884627)]),
+        8.378,
+    ),
+    "a circle near the cable": (Scene([Circle(center=(105.30622805819056, 118.08786592472427), radius=5.623)]), 11.735),
+    "a circle inside a triangle": (
+        Scene(
+            [
+                Polygon(corners=((50.13, 107.127), (33.146, 112.835), (39.128, 88.592)), radius=0.10507),
+                Circle(center=(40.838, 98.444), radius=5.518),
+            ]
+        ),
+        6.77,
+    ),
+}
+
+
+@pytest.mark.parametrize("scene, cable", NARROW.values(), ids=NARROW)
+def test_large_steps_end_where_small_ones_do(scene, cable):
+    solver = Solver(Robot.prototype(), scene)
+    small = walk(solver, np.linspace(0, cable, 401)[1:])
+    assert {state.status for state in small} == {Status.CONVERGED}
+    for steps in (1, 2, 5, 12, 25, 50):
+        end = walk(solver, np.linspace(0, cable, steps + 1)[1:])[-1]
+        assert end.nodes == pytest.approx(small[-1].nodes, abs=1e-6)
+
+
 # No tolerance is a number of millimetres.
 
 

@@ -42,3 +42,27 @@ def test_a_sharp_edge_costs_no_more_than_a_round_one(edge):
         return min(times)
 
     assert cost(edge) <= 3 * cost(1.0)
+
+
+@pytest.mark.parametrize(
+    "center, radius, cables",
+    [
+        ((-53.38524317875361, 7.5417771509344975, 164.1778276218874), 6.8916836565247666, (-5.5397466, 1.46007529)),
+        (
+            (31.58650833487242, -48.89395350346166, 115.31998095294595),
+            7.54523181151059,
+            (4.967132041982063, -7.948860686),
+        ),
+    ],
+)
+def test_large_steps_end_where_small_ones_do(center, radius, cables):
+    """Which of two neighbouring points meets a narrow obstacle does not depend on the size of the steps."""
+    solver = SpatialSolver(SpatialRobot.prototype(), Scene([Sphere(center=center, radius=radius)]))
+    ends = []
+    for steps in (400, 1, 2, 5, 12, 20, 50):
+        state = solver.rest()
+        for part in np.arange(1, steps + 1) / steps:
+            state = solver.step(state, part * np.array(cables))
+            assert state.status is Status.CONVERGED
+        ends.append(state.nodes)
+    assert ends[1:] == [pytest.approx(ends[0], abs=1e-6)] * len(ends[1:])
