@@ -15,6 +15,7 @@ from solver.solve import check_scene
 from solver.validation import instance, number, whole
 
 NEWTON_ITERATIONS = 8
+RESOLVED = 1e-9  # of the cable limit: a line over less is fitted to roundoff
 
 
 class _Segment(NamedTuple):
@@ -54,13 +55,15 @@ def fitted_slopes(robot: Robot, low_mm: float, high_mm: float, node: int | None 
     With ``node``, those of the node of that index.
 
     Raises:
-        ValueError: If the range is empty or outside the robot's, or the node is none of it.
+        ValueError: If the range is too small to fit a line to or outside the robot's, or the node is none of it.
         TypeError: If the robot is something else.
     """
     node = _node(robot, robot.segments if node is None else node)
     low, high = _cable(robot, low_mm), _cable(robot, high_mm)
-    if not low < high:
-        raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within 0 to {robot.cable_limit_mm:.6g} mm")
+    least = RESOLVED * robot.cable_limit_mm
+    if not high - low >= least:
+        bounds = f"0 to {robot.cable_limit_mm:.6g} mm, by at least {least:.2g} mm"
+        raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within {bounds}")
     cables = np.linspace(low, high, 101).tolist()
     tips = np.array([free_nodes(robot, cable)[node] for cable in cables])
     return np.asarray(np.polyfit(cables, tips, 1)[0])

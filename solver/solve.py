@@ -45,8 +45,8 @@ def read_trace(traced: tuple[list[float], int], robot: AnyRobot, scene: Scene, s
     numbers, reason = traced
     rows = np.reshape(numbers, (-1, int(ends[-1])))
     columns = np.split(rows, ends[:-1], axis=1)
-    shapes = (column.reshape(-1, *part) for column, part in zip(columns, parts, strict=True))
-    return Trace(*shapes, REASONS[reason])
+    nodes, points, moved = (column.reshape(-1, *part) for column, part in zip(columns, parts, strict=True))
+    return Trace(nodes, points, moved, REASONS[reason])
 
 
 class Solver:

@@ -116,7 +116,7 @@ NARROW = {
 }
 
 
-@pytest.mark.parametrize("scene, cable", NARROW.values(), ids=NARROW)
+@pytest.mark.parametrize(("scene", "cable"), NARROW.values(), ids=NARROW)
 def test_large_steps_end_where_small_ones_do(scene, cable):
     solver = Solver(Robot.prototype(), scene)
     small = walk(solver, np.linspace(0, cable, 401)[1:])

@@ -53,3 +53,9 @@ def test_clearance_is_the_smallest_gap_of_the_free_robot(cable):
     rest = Solver(robot_with(cable), scene).rest()
     assert clearance(rest.robot, scene, 0.0) == pytest.approx(rest.gaps.min(), abs=1e-12)
     assert clearance(rest.robot, Scene(), 3.0) == math.inf
+
+
+@pytest.mark.parametrize("high", [1e-320, 1e-12])
+def test_a_line_is_not_fitted_to_roundoff(high):
+    with pytest.raises(ValueError, match="must grow within 0 to .* mm, by at least"):
+        fitted_slopes(Robot.prototype(), 0.0, high)

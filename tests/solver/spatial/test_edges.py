@@ -45,7 +45,7 @@ def test_a_sharp_edge_costs_no_more_than_a_round_one(edge):
 
 
 @pytest.mark.parametrize(
-    "center, radius, cables",
+    ("center", "radius", "cables"),
     [
         ((-53.38524317875361, 7.5417771509344975, 164.1778276218874), 6.8916836565247666, (-5.5397466, 1.46007529)),
         (
