@@ -57,5 +57,5 @@ def test_clearance_is_the_smallest_gap_of_the_free_robot(cable):
 
 @pytest.mark.parametrize("high", [1e-320, 1e-12])
 def test_a_line_is_not_fitted_to_roundoff(high):
-    with pytest.raises(ValueError, match="must grow within 0 to .* mm, by at least"):
+    with pytest.raises(ValueError, match=r"must grow within 0 to .* mm, by at least"):
         fitted_slopes(Robot.prototype(), 0.0, high)
