@@ -45,6 +45,7 @@ instructions: $(INSTALL)  ## count instructions of the kernel (needs valgrind)
 
 soak: $(INSTALL)
 	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
+	$(BIN)/python -m pytest -k fuzz --hypothesis-profile=default
 
 $(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/*) solver/formulation.py solver/spatial/formulation.py solver/codegen.py
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)

@@ -1,6 +1,11 @@
 import os
 
 import pytest
+from hypothesis import settings
+
+# The same examples on every run; `make soak` asks for others with --hypothesis-profile=default.
+settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+settings.load_profile("repeatable")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -19,7 +19,7 @@ from solver.spatial import Sphere
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 EVERY_FORM = pytest.mark.parametrize("count", [None, 3])  # of environments; one of them on its own
-fuzz = settings(derandomize=True, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+fuzz = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 DRAWS = 20
 SLIPS = "could slip between points"
 OPTIONS = ("seed", "options", "scene", "desired_force", "reset_mask", "overlaps the straight robot", SLIPS)

@@ -35,7 +35,7 @@ def follow(solver, changes):
 
 
 @EVERY_CABLE
-@settings(max_examples=40, deadline=None, derandomize=True, database=None)
+@settings(max_examples=40)
 @given(scene=scenes, start=st.floats(1, 8), changes=increments)
 def test_residuals(cable, scene, start, changes):
     robot = replace(Robot.prototype(), cable=cable, length_range_mm=(SHORTEST, LONGEST))
@@ -73,7 +73,7 @@ def certify(equilibria):
 
 
 @EVERY_CABLE
-@settings(max_examples=8, deadline=None, derandomize=True, database=None)
+@settings(max_examples=8)
 @given(scene=scenes, changes=st.lists(st.tuples(st.floats(0.1, 0.5), st.floats(-1, 1)), min_size=24, max_size=40))
 def test_reference_solver(cable, scene, changes):
     robot = replace(Robot.prototype(max_tension=math.inf), cable=cable, length_range_mm=(SHORTEST, LONGEST))

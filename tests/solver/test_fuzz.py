@@ -80,7 +80,7 @@ ROBOTS = [
     (Robot, {"length_mm": 180, "segments": 6, "offset_mm": 8, "between": 2}),
     (SpatialRobot, {"length_mm": 180, "segments": 6, "offset_mm": 8, "between": 2}),
 ]
-fuzz = settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+fuzz = settings(max_examples=200, suppress_health_check=list(HealthCheck))
 
 
 def survives(call, *arguments, **named):
