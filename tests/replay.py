@@ -88,7 +88,7 @@ def _sample_in_plane(generator):
     spring = generator.choice([None, 0.05])
     kind = generator.integers(3)
     if kind == 0:
-        return HalfPlane(point=tuple(center + [30, 0]), normal=(-1.0, generator.uniform(-0.3, 0.3)))
+        return HalfPlane(point=tuple(center + np.array([30.0, 0.0])), normal=(-1.0, generator.uniform(-0.3, 0.3)))
     if kind == 1:
         angles = np.sort(generator.uniform(0, 2 * np.pi, 3))
         corners = center + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
