@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "branch.hpp"
+#include "solve/continuation.hpp"
 #include "robots.hpp"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "branch.hpp"
+#include "solve/continuation.hpp"
 #include "pool.hpp"
 
 namespace ccr {

@@ -326,7 +326,7 @@ NB_MODULE(_kernel, m) {
   m.doc() = "Chain solver: Riccati-Newton SQP on the reduced coordinates, followed along a branch.";
   m.attr("SHAPES") = ccr::kShapeNames;
   m.attr("SHAPE_SIZE") = ccr::kShapeSize;
-  m.attr("MAX_ACTIVE") = ccr::limits::kMaxActive;
+  m.attr("MAX_ACTIVE") = ccr::tolerances::kMaxActive;
   nb::class_<ccr::Robot>(m, "Robot", "A robot as the kernel takes it.")
       .def("__init__",
            [](ccr::Robot* self, bool sliding, int segments, double offset, double angle, double rigidity,

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "linalg.hpp"
+#include "math/linalg.hpp"
 
 namespace ccr::testing {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <random>
 
-#include "linalg.hpp"
+#include "math/linalg.hpp"
 
 namespace ccr::testing {
 

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "obstacle.hpp"
-#include "robot.hpp"
-#include "sweep.hpp"
+#include "model/obstacle.hpp"
+#include "model/robot.hpp"
+#include "solve/sweep.hpp"
 
 namespace ccr::testing {
 

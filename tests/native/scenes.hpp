@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "branch.hpp"
+#include "solve/continuation.hpp"
 #include "random.hpp"
 #include "robots.hpp"
 

@@ -2,10 +2,10 @@
 #include <doctest/doctest.h>
 
 #include "dense.hpp"
-#include "planar.hpp"
+#include "model/planar.hpp"
 #include "random.hpp"
-#include "riccati.hpp"
-#include "spatial.hpp"
+#include "math/riccati.hpp"
+#include "model/spatial.hpp"
 
 namespace ccr::testing {
 namespace {

@@ -5,20 +5,20 @@
 #include <numbers>
 
 #include "random.hpp"
-#include "segment.hpp"
+#include "model/segment.hpp"
 
 namespace ccr {
 
-#ifdef CCR_WIDE
+#ifdef CCR_AVX2
 #define CCR_DECLARE(REGISTERS)                                                                                          \
   namespace REGISTERS {                                                                                                 \
-  void bend(int, const double*, double, double, double, UniformCable::Bends&);                                          \
-  void bend(int, const double*, double, double, SlidingCable::Bends&);                                                  \
-  bool bend(int, const TwoCables::Told&, const Rows&, Rows&, Rows&);                                                    \
-  void bow(int, const TwoCables::Told&, const Rows&, const Rows&, const Rows&, Rows&);                                  \
+  void bend(int, const double*, double, double, double, PaperLaw::Bends&);                                          \
+  void bend(int, const double*, double, double, RodLaw::Bends&);                                                  \
+  bool bend(int, const SegmentInputs&, const Rows&, Rows&, Rows&);                                                    \
+  void hessian_contraction(int, const SegmentInputs&, const Rows&, const Rows&, const Rows&, Rows&);                                  \
   }
 CCR_DECLARE(baseline)
-CCR_DECLARE(wide)
+CCR_DECLARE(avx2)
 #endif
 
 namespace testing {
@@ -30,15 +30,15 @@ constexpr double kClose = 1e-8;               // what they leave, relative to sl
 
 bool near(double a, double b, double scale) { return std::abs(a - b) <= kClose * scale; }
 
-UniformCable::Bend uniform(double sine, double pull, double scale) {
-  UniformCable::Bends bends(1);
-  UniformCable::bend(1, &sine, pull * scale, 10 * scale, 8 * scale, bends);
+PaperLaw::Bend uniform(double sine, double pull, double scale) {
+  PaperLaw::Bends bends(1);
+  PaperLaw::bend(1, &sine, pull * scale, 10 * scale, 8 * scale, bends);
   return bends[0];
 }
 
-SlidingCable::Bend sliding(double angle, double scale) {
-  SlidingCable::Bends bends(1);
-  SlidingCable::bend(1, &angle, 0, 10 * scale, 8 * scale, bends);
+RodLaw::Bend sliding(double angle, double scale) {
+  RodLaw::Bends bends(1);
+  RodLaw::bend(1, &angle, 0, 10 * scale, 8 * scale, bends);
   return bends[0];
 }
 
@@ -48,8 +48,8 @@ double cable_length(double forward, double sideways, double cosine, double sine,
   return scale * std::hypot(x, y);
 }
 
-double heading(const UniformCable::Bend& bend) { return std::atan2(bend.sideways, bend.forward); }
-double chord(const SlidingCable::Bend& bend) { return std::hypot(bend.forward, bend.sideways); }
+double heading(const PaperLaw::Bend& bend) { return std::atan2(bend.sideways, bend.forward); }
+double chord(const RodLaw::Bend& bend) { return std::hypot(bend.forward, bend.sideways); }
 
 TEST_CASE("a segment of a uniform cable is as long as its cables say") {
   for (const double scale : kScales)
@@ -121,42 +121,42 @@ struct InSpace {
   Vec<2> objective_pull_slope;
   Mat<3, 2> chord_pull_slope, turn_pull_slope;
 };
-static_assert(sizeof(InSpace) == TwoCables::kBend * sizeof(double));
+static_assert(sizeof(InSpace) == SpatialLaw::kBend * sizeof(double));
 
-TwoCables::Told told(const Vec<2>& pulls, double angle, double scale) {
+SegmentInputs segment_inputs(const Vec<2>& pulls, double angle, double scale) {
   return {{pulls[0] * scale, pulls[1] * scale}, 10 * scale, {8 * scale, 0, 8 * scale * std::cos(angle), 8 * scale * std::sin(angle)}};
 }
 
 struct Space {
-  explicit Space(int n) : controls(TwoCables::kControl, n), bendings(TwoCables::kBending, n), bends(TwoCables::kBend, n) {}
+  explicit Space(int n) : controls(SpatialLaw::kControl, n), bendings(SpatialLaw::kBending, n), bends(SpatialLaw::kBend, n) {}
 
-  bool bend(int n, const TwoCables::Told& told) { return TwoCables::bend(n, told, controls, bendings, bends); }
+  bool bend(int n, const SegmentInputs& inputs) { return SpatialLaw::bend(n, inputs, controls, bendings, bends); }
   InSpace at(int segment) const {
     InSpace out;
-    bends.get(segment, out.chord.v.data(), TwoCables::kBend);
+    bends.get(segment, out.chord.v.data(), SpatialLaw::kBend);
     return out;
   }
 
   Rows controls, bendings, bends;
 };
 
-InSpace in_space(const Vec<3>& control, const TwoCables::Told& told) {
+InSpace in_space(const Vec<3>& control, const SegmentInputs& inputs) {
   Space space(1);
   space.controls.put(0, control.v.data(), 3);
-  REQUIRE(space.bend(1, told));
+  REQUIRE(space.bend(1, inputs));
   return space.at(0);
 }
 
-Mat<3, 3> bow(const Vec<3>& control, const TwoCables::Told& told, const Vec<3>& force, const Vec<3>& moment) {
+Mat<3, 3> hessian_contraction(const Vec<3>& control, const SegmentInputs& inputs, const Vec<3>& force, const Vec<3>& moment) {
   Space space(1);
   space.controls.put(0, control.v.data(), 3);
-  REQUIRE(space.bend(1, told));
-  Rows adjoints(TwoCables::kAdjoint, 1), bows(TwoCables::kBow, 1);
+  REQUIRE(space.bend(1, inputs));
+  Rows adjoints(SpatialLaw::kAdjoint, 1), hessians(SpatialLaw::kHessian, 1);
   adjoints.put(0, force.v.data(), 3);
   adjoints.put(0, moment.v.data(), 3, 3);
-  TwoCables::bow(1, told, space.controls, space.bendings, adjoints, bows);
+  SpatialLaw::hessian_contraction(1, inputs, space.controls, space.bendings, adjoints, hessians);
   Mat<3, 3> out;
-  bows.get(0, out.v.data(), TwoCables::kBow);
+  hessians.get(0, out.v.data(), SpatialLaw::kHessian);
   return out;
 }
 
@@ -195,15 +195,15 @@ std::vector<Case> cases() {
 
 TEST_CASE("a segment in space is as long as its cables say") {
   for (const Case& c : cases()) {
-    const TwoCables::Told all = told(c.pulls, c.angle, c.scale);
-    const InSpace bend = in_space(c.control, all);
-    CHECK(norm(bend.chord) == doctest::Approx(all.length).epsilon(1e-14));
+    const SegmentInputs inputs = segment_inputs(c.pulls, c.angle, c.scale);
+    const InSpace bend = in_space(c.control, inputs);
+    CHECK(norm(bend.chord) == doctest::Approx(inputs.length).epsilon(1e-14));
     for (int k = 0; k < 2; ++k) {
-      const Vec<3> hole = {{all.holes[2 * k], all.holes[2 * k + 1], 0}};
+      const Vec<3> hole = {{inputs.holes[2 * k], inputs.holes[2 * k + 1], 0}};
       Vec<3> way = times(bend.rotation, hole);
       way += bend.chord;
       way -= hole;
-      CHECK(norm(way) == doctest::Approx(all.length - all.pulls[k]).epsilon(1e-13));
+      CHECK(norm(way) == doctest::Approx(inputs.length - inputs.displacements[k]).epsilon(1e-13));
     }
   }
 }
@@ -211,8 +211,8 @@ TEST_CASE("a segment in space is as long as its cables say") {
 TEST_CASE("the slopes of a segment in space are those of its shape") {
   const double h = kDifference;
   for (const Case& c : cases()) {
-    const TwoCables::Told all = told(c.pulls, c.angle, c.scale);
-    const InSpace at = in_space(c.control, all);
+    const SegmentInputs inputs = segment_inputs(c.pulls, c.angle, c.scale);
+    const InSpace at = in_space(c.control, inputs);
     const auto compare = [&](const InSpace& more, const InSpace& less, double step, double objective, const Vec<3>& chord,
                              const Vec<3>& turned, double unit) {
       CHECK(near(objective * unit, (more.objective - less.objective) / step * unit, 1));
@@ -227,14 +227,14 @@ TEST_CASE("the slopes of a segment in space are those of its shape") {
       Vec<3> up = c.control, down = c.control;
       up[k] += h;
       down[k] -= h;
-      compare(in_space(up, all), in_space(down, all), 2 * h, at.objective_slope[k], column(at.chord_slope, k),
+      compare(in_space(up, inputs), in_space(down, inputs), 2 * h, at.objective_slope[k], column(at.chord_slope, k),
               column(at.turn_slope, k), 1);
     }
     for (int k = 0; k < 2; ++k) {
       Vec<2> up = c.pulls, down = c.pulls;
       up[k] += h;
       down[k] -= h;
-      compare(in_space(c.control, told(up, c.angle, c.scale)), in_space(c.control, told(down, c.angle, c.scale)),
+      compare(in_space(c.control, segment_inputs(up, c.angle, c.scale)), in_space(c.control, segment_inputs(down, c.angle, c.scale)),
               2 * h * c.scale, at.objective_pull_slope[k], column(at.chord_pull_slope, k), column(at.turn_pull_slope, k), c.scale);
     }
   }
@@ -244,15 +244,15 @@ TEST_CASE("the curvature of a segment in space is that of its work") {
   Random random(2);
   const double h = kDifference;
   for (const Case& c : cases()) {
-    const TwoCables::Told all = told(c.pulls, c.angle, c.scale);
+    const SegmentInputs inputs = segment_inputs(c.pulls, c.angle, c.scale);
     const Vec<3> force = random.matrix<3>(1 / c.scale), moment = random.matrix<3>();
-    const Mat<3, 3> curved = bow(c.control, all, force, moment);
+    const Mat<3, 3> curved = hessian_contraction(c.control, inputs, force, moment);
     Mat<3, 3> found;
     for (int k = 0; k < 3; ++k) {
       Vec<3> up = c.control, down = c.control;
       up[k] += h;
       down[k] -= h;
-      const Vec<3> more = slope(in_space(up, all), force, moment), less = slope(in_space(down, all), force, moment);
+      const Vec<3> more = slope(in_space(up, inputs), force, moment), less = slope(in_space(down, inputs), force, moment);
       for (int r = 0; r < 3; ++r) {  // a turn's second derivative is taken to be symmetric
         found(r, k) += (more[r] - less[r]) / (4 * h);
         found(k, r) += (more[r] - less[r]) / (4 * h);
@@ -266,10 +266,10 @@ TEST_CASE("cables that cannot have their lengths are refused") {
   Space space(3);
   const double sheared[] = {2, 0, 0};
   space.controls.put(1, sheared, 3);
-  CHECK_FALSE(space.bend(3, told({{0.1, 0.1}}, 1.5, 1)));
+  CHECK_FALSE(space.bend(3, segment_inputs({{0.1, 0.1}}, 1.5, 1)));
 }
 
-#ifdef CCR_WIDE
+#ifdef CCR_AVX2
 
 bool same_bits(const Rows& a, const Rows& b, int numbers, int segments) {
   for (int k = 0; k < numbers; ++k)
@@ -283,32 +283,32 @@ TEST_CASE("wide registers change no bit" * doctest::skip(!__builtin_cpu_supports
     std::vector<double> coordinates(static_cast<std::size_t>(n));
     for (double& one : coordinates) one = random.uniform(-1, 1);  // some beyond the range of the law
     const double pull = random.uniform(0, 0.8);
-    UniformCable::Bends one(n), four(n);
+    PaperLaw::Bends one(n), four(n);
     baseline::bend(n, coordinates.data(), pull, 10, 8, one);
-    wide::bend(n, coordinates.data(), pull, 10, 8, four);
-    CHECK(same_bits(one, four, UniformCable::Bends::kLaws, n));
+    avx2::bend(n, coordinates.data(), pull, 10, 8, four);
+    CHECK(same_bits(one, four, PaperLaw::Bends::kLaws, n));
 
     for (double& angle : coordinates) angle *= 3;
-    SlidingCable::Bends arc(n), arcs(n);
+    RodLaw::Bends arc(n), arcs(n);
     baseline::bend(n, coordinates.data(), 10, 8, arc);
-    wide::bend(n, coordinates.data(), 10, 8, arcs);
-    CHECK(same_bits(arc, arcs, SlidingCable::Bends::kLaws, n));
+    avx2::bend(n, coordinates.data(), 10, 8, arcs);
+    CHECK(same_bits(arc, arcs, RodLaw::Bends::kLaws, n));
 
-    const TwoCables::Told all = told({{random.uniform(0, 0.6), random.uniform(0, 0.6)}}, 1.3, 1);
+    const SegmentInputs inputs = segment_inputs({{random.uniform(0, 0.6), random.uniform(0, 0.6)}}, 1.3, 1);
     Space narrow(n), broad(n);
-    Rows adjoints(TwoCables::kAdjoint, n), bow(TwoCables::kBow, n), bows(TwoCables::kBow, n);
+    Rows adjoints(SpatialLaw::kAdjoint, n), hessian_contraction(SpatialLaw::kHessian, n), hessians(SpatialLaw::kHessian, n);
     for (int i = 0; i < n; ++i) {
       narrow.controls.put(i, random.matrix<3>(0.15).v.data(), 3);
       adjoints.put(i, random.matrix<6>().v.data(), 6);
     }
     broad.controls = narrow.controls;
-    CHECK(baseline::bend(n, all, narrow.controls, narrow.bendings, narrow.bends));
-    CHECK(wide::bend(n, all, broad.controls, broad.bendings, broad.bends));
-    CHECK(same_bits(narrow.bendings, broad.bendings, TwoCables::kBending, n));
-    CHECK(same_bits(narrow.bends, broad.bends, TwoCables::kBend, n));
-    baseline::bow(n, all, narrow.controls, narrow.bendings, adjoints, bow);
-    wide::bow(n, all, broad.controls, broad.bendings, adjoints, bows);
-    CHECK(same_bits(bow, bows, TwoCables::kBow, n));
+    CHECK(baseline::bend(n, inputs, narrow.controls, narrow.bendings, narrow.bends));
+    CHECK(avx2::bend(n, inputs, broad.controls, broad.bendings, broad.bends));
+    CHECK(same_bits(narrow.bendings, broad.bendings, SpatialLaw::kBending, n));
+    CHECK(same_bits(narrow.bends, broad.bends, SpatialLaw::kBend, n));
+    baseline::hessian_contraction(n, inputs, narrow.controls, narrow.bendings, adjoints, bow);
+    avx2::hessian_contraction(n, inputs, broad.controls, broad.bendings, adjoints, hessians);
+    CHECK(same_bits(bow, hessians, SpatialLaw::kHessian, n));
   }
 }
 

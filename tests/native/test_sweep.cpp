@@ -2,9 +2,9 @@
 #include <doctest/doctest.h>
 
 #include "distance.hpp"
-#include "limits.hpp"
+#include "tolerances.hpp"
 #include "scenes.hpp"
-#include "sweep.hpp"
+#include "solve/sweep.hpp"
 
 namespace ccr::testing {
 namespace {
@@ -98,10 +98,10 @@ void depths() {
   each_obstacle<D>(1, 10, [](Random& random, const Obstacle<D>& obstacle, const Position<D>& at, double r) {
     for (int k = 0; k < 20; ++k) {
       const Position<D> point = beside(random, at, r * random.uniform(0, 3));
-      const double deep = -signed_distance(obstacle, point), told = depth(obstacle, point);
-      CHECK(told >= deep - sagitta(obstacle) - 1e-9 * r);
-      if (deep < 0) CHECK(told <= 1e-9 * r);
-      if (deep > 0) CHECK(told <= 1.1 * deep + 0.2 * r * !obstacle.outline.empty() + 1e-9 * r);
+      const double deep = -signed_distance(obstacle, point), found = depth(obstacle, point);
+      CHECK(found >= deep - sagitta(obstacle) - 1e-9 * r);
+      if (deep < 0) CHECK(found <= 1e-9 * r);
+      if (deep > 0) CHECK(found <= 1.1 * deep + 0.2 * r * !obstacle.outline.empty() + 1e-9 * r);
     }
   });
 }
@@ -111,7 +111,7 @@ void paths() {
   int clear = 0, barred = 0;
   each_obstacle<D>(2, 10, [&](Random& random, const Obstacle<D>& obstacle, const Position<D>& at, double r) {
     if (obstacle.wall()) return;
-    const double allowed = limits::kSweepDepth * obstacle.inradius;
+    const double allowed = tolerances::kSweepDepth * obstacle.inradius;
     for (int k = 0; k < 20; ++k) {
       const Position<D> from = outside(random, obstacle, at, r);
       const Position<D> to = k % 3 == 0 ? close_to(random, obstacle, from, 2 * r) : outside(random, obstacle, at, r);

@@ -1,0 +1,187 @@
+#include "model/planar.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tolerances.hpp"
+
+// The generated law of the disks, inlined here.
+#define CASADI_SYMBOL_EXPORT static inline
+#include "disk_laws.c"
+
+namespace ccr {
+
+namespace {
+
+// A chord d in the base frame seen by the adjoint p of the node it leads to: its moment about the lower node, where a
+// turn moves the upper one by (-dy, dx), and -p·d.
+template <class Bend, int N>
+double turning(const Vec<N>& p, const Bend& bend) {
+  return p[1] * bend.dx - p[0] * bend.dy;
+}
+
+template <class Bend, int N>
+double inward(const Vec<N>& p, const Bend& bend) {
+  return -(p[0] * bend.dx + p[1] * bend.dy);
+}
+
+}  // namespace
+
+template <class Cable>
+Planar<Cable>::Planar(const Robot& robot)
+    : states(robot.segments + 1),
+      frames(robot.segments + 1),
+      gradient(robot.segments),
+      robot_(robot),
+      bends_(robot.segments),
+      one_(1),
+      adjoints_(robot.segments) {}
+
+template <class Cable>
+bool Planar<Cable>::evaluate(const Command<1>& command, const std::vector<Control>& controls) {
+  const int n = robot_.segments;
+  pull_ = command.cables[0] / n;
+  length_ = command.length / n;
+  objective = steepest = widest = 0;
+  Cable::bend(n, controls[0].v.data(), pull_, length_, robot_.offset, bends_);
+  states[0] = {};
+  frames[0] = {{1, 0}};
+  for (int i = 0; i < n; ++i) {
+    const auto bend = bends_[i];
+    const double c = frames[i][0], s = frames[i][1];  // of the lower disk
+    const double dx = -length_ * (s * bend.forward + c * bend.sideways);
+    const double dy = length_ * (c * bend.forward - s * bend.sideways);
+    bends_.place(i, dx, dy);
+    frames[i + 1] = {{c * bend.cosine + s * bend.sine, s * bend.cosine - c * bend.sine}};
+    State& next = states[i + 1];
+    next = states[i];
+    next[0] += dx;
+    next[1] += dy;
+    next[2] -= bend.angle;
+    if constexpr (kRod) next[3] += bend.taken;
+    objective += bend.angle * bend.angle;
+    steepest = std::max(steepest, std::abs(2 * bend.angle * bend.slope));
+    widest = std::max(widest, std::abs(bend.angle));
+  }
+  return std::isfinite(objective) && !(kRod && widest > tolerances::kWidestTurn);
+}
+
+template <class Cable>
+void Planar<Cable>::adjoin(const std::vector<State>& pulls) {
+  State p;
+  for (int i = robot_.segments - 1; i >= 0; --i) {
+    const auto bend = bends_[i];
+    p -= pulls[i + 1];
+    adjoints_[i] = p;
+    const double turn = turning(p, bend);
+    gradient[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
+    if constexpr (kRod) gradient[i][0] += p[3] * bend.taken_slope - inward(p, bend) * bend.stretch;
+    p[2] += turn;
+  }
+}
+
+template <class Cable>
+void Planar<Cable>::curvature(System& system) const {
+  for (int i = 0; i < robot_.segments; ++i) {
+    const auto bend = bends_[i];
+    const State& p = adjoints_[i];
+    const double turn = turning(p, bend), inward = ccr::inward(p, bend), heading = bend.heading_slope;
+    typename System::Stage& stage = system.stages[i];
+    stage.a = {-bend.dy, bend.dx};
+    stage.b[0] = -bend.dy * heading;
+    stage.b[1] = bend.dx * heading;
+    stage.b[2] = -bend.slope;
+    system.node_hessian[i] = {};
+    system.node_hessian[i](2, 2) = inward;
+    stage.hux = {{0, 0, inward * heading}};
+    stage.huu = {{2 * (bend.slope * bend.slope + bend.angle * bend.curvature) + inward * heading * heading +
+                  turn * bend.heading_curvature - p[2] * bend.curvature}};
+    if constexpr (kRod) {
+      stage.b[0] += bend.dx * bend.stretch;
+      stage.b[1] += bend.dy * bend.stretch;
+      stage.b[3] = bend.taken_slope;
+      stage.hux[2] += turn * bend.stretch;
+      stage.huu[0] += p[3] * bend.taken_curvature + 2 * turn * bend.stretch * heading - inward * bend.stretch_slope;
+    }
+  }
+  system.node_hessian[robot_.segments] = {};
+}
+
+// With a sliding cable that is the multiplier of its slack.
+template <class Cable>
+Vec<1> Planar<Cable>::pull_slopes() const {
+  Vec<1> slope;
+  if constexpr (!kRod)
+    for (int i = 0; i < robot_.segments; ++i) {
+      const auto bend = bends_[i];
+      const State& p = adjoints_[i];
+      slope[0] += bend.pull_slope * (2 * bend.angle - turning(p, bend) / 2 - p[2]);
+    }
+  slope[0] /= robot_.segments;
+  return slope;
+}
+
+template <class Cable>
+DiskGap Planar<Cable>::disk_gap(int segment, int side) const requires(kRod) {
+  const double angle = side * bends_[segment].angle;
+  const double* in[] = {&angle, &length_, &robot_.disk_radius, &robot_.disk_thickness};
+  DiskGap gap;
+  double* out[] = {&gap.value};
+  ccr_disk_gap(in, out, nullptr, nullptr, 0);
+  gap.slope *= side;
+  return gap;
+}
+
+template <class Cable>
+Planar<Cable>::Control Planar<Cable>::relaxed(const Command<1>& command) {
+  if (command == relaxed_at_) return relaxed_;
+  const double pull = command.cables[0] / robot_.segments, length = command.length / robot_.segments;
+  relaxed_at_ = command;
+  relaxed_ = {};
+  if constexpr (kRod) relaxed_[0] = pull / robot_.offset;
+  for (int i = 0; i <= tolerances::kRelaxIterations; ++i) {
+    Cable::bend(1, relaxed_.v.data(), pull, length, robot_.offset, one_);
+    if constexpr (!kRod) {
+      break;
+    } else {
+      const double change = (one_[0].taken - pull) / one_[0].taken_slope;
+      relaxed_[0] -= change;
+      if (std::abs(change) <= tolerances::kRelaxed * std::abs(relaxed_[0])) break;
+    }
+  }
+  return relaxed_;
+}
+
+// All segments have the same shape: the sums over their directions (i + 1/2) θ are taken by turning one of them on.
+template <class Cable>
+Vec<3> Planar<Cable>::free_slopes(const Command<1>& command) {
+  const int n = robot_.segments;
+  const double length = command.length / n;
+  relaxed(command);
+  const auto bend = one_[0];
+  double turn, stretch = 0;  // slopes of the angle and of the logarithm of the chord
+  if constexpr (kRod) {
+    turn = 1 / (n * bend.taken_slope);
+    stretch = bend.stretch * turn;
+  } else {
+    turn = bend.pull_slope / n;
+  }
+  const double chord = length * std::sqrt(bend.forward * bend.forward + bend.sideways * bend.sideways);
+  double cosine = std::cos(bend.angle / 2), sine = std::sin(bend.angle / 2);
+  Vec<3> slopes{};
+  for (int i = 0; i < n; ++i) {
+    const double swing = (i + 0.5) * turn;
+    slopes[0] += chord * (stretch * sine + swing * cosine);
+    slopes[1] += chord * (stretch * cosine - swing * sine);
+    const double next = cosine * bend.cosine - sine * bend.sine;
+    sine = sine * bend.cosine + cosine * bend.sine;
+    cosine = next;
+  }
+  slopes[2] = -n * turn;
+  return slopes;
+}
+
+template class Planar<PaperLaw>;
+template class Planar<RodLaw>;
+
+}  // namespace ccr

@@ -1,0 +1,109 @@
+// The models of a segment and its cables, with their generated laws for all segments of a robot.
+#pragma once
+
+#include <vector>
+
+namespace ccr {
+
+// Numbers of all segments, kept number by number so that the laws can read and write them several segments at a time.
+class Rows {
+ public:
+  Rows(int numbers, int segments)
+      : stride_((segments + kPadding - 1) / kPadding * kPadding), values_(numbers * stride_) {}
+
+  double* row(int number) { return values_.data() + number * stride_; }
+  const double* row(int number) const { return values_.data() + number * stride_; }
+  double at(int number, int segment) const { return values_[number * stride_ + segment]; }
+  void put(int segment, const double* numbers, int count, int first = 0) {
+    for (int k = 0; k < count; ++k) values_[(first + k) * stride_ + segment] = numbers[k];
+  }
+  void get(int segment, double* numbers, int count) const {
+    for (int k = 0; k < count; ++k) numbers[k] = at(k, segment);
+  }
+
+ private:
+  static constexpr int kPadding = 4;  // at least the width of the lanes
+
+  int stride_;
+  std::vector<double> values_;
+};
+
+// Bends of all segments in the plane: what the laws give, then the chord in the base frame.
+template <class Bend>
+class Table : public Rows {
+ public:
+  static constexpr int kLaws = 10;
+
+  explicit Table(int segments) : Rows(kLaws + 2, segments) {}
+
+  Bend operator[](int i) const {
+    return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
+            at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
+  }
+  void place(int segment, double dx, double dy) {
+    row(kLaws)[segment] = dx;
+    row(kLaws + 1)[segment] = dy;
+  }
+};
+
+// The cable is shared equally among the segments (the paper). A segment shears: its coordinate is σ, the sine of the
+// shear angle, and its backbone stays straight.
+struct PaperLaw {
+  static constexpr int kState = 3;  // x, y, disk angle
+  static constexpr bool kRod = false;
+
+  struct Bend {
+    double angle, slope, curvature, pull_slope;   // θ, θ_σ, θ_σσ, θ_pull
+    double forward, sideways;                     // backbone segment from the lower disk's y axis, over its length
+    double heading_slope, heading_curvature;      // of its direction
+    double cosine, sine;                          // of θ
+    double dx, dy;                                // backbone segment in the base frame
+  };
+
+  using Bends = Table<Bend>;
+
+  // Fills all but dx and dy of n segments; NaN where the law has no value.
+  static void bend(int n, const double* sines, double pull, double length, double offset, Bends& bends);
+};
+
+// The cable slides through all disks (Rao 2024). A segment is an arc, its coordinate the angle θ between its disks; what
+// the segments take from the cable is summed up in the state, and may not be less than is pulled.
+struct RodLaw {
+  static constexpr int kState = 4;  // x, y, disk angle, cable taken
+  static constexpr bool kRod = true;
+
+  struct Bend {
+    double angle;                                 // θ
+    double forward, sideways;                     // chord from the lower disk's y axis, over the segment's length
+    double stretch, stretch_slope;                // c'/c and c''/c of its length
+    double cosine, sine;                          // of θ
+    double taken, taken_slope, taken_curvature;   // from the cable
+    double dx, dy;                                // chord in the base frame
+    static constexpr double slope = 1, curvature = 0, heading_slope = -0.5, heading_curvature = 0;
+  };
+
+  using Bends = Table<Bend>;
+
+  static void bend(int n, const double* angles, double pull, double length, double offset, Bends& bends);
+};
+
+// Inputs of the law of a segment in space, the same for all segments.
+struct SegmentInputs {
+  double displacements[2];  // of each cable, the share of a segment [mm]
+  double length;            // of the backbone of a segment [mm]
+  double holes[4];          // where the pulled cables pass the disk: x, y of each [mm]
+};
+
+// Two cables in space, each shared equally among the segments. The controls of a segment are its shears and its twist; the
+// lengths of the cables give its bending.
+struct SpatialLaw {
+  static constexpr int kControl = 3, kBending = 2, kBend = 48, kAdjoint = 6, kHessian = 9;
+
+  // The bendings of n segments and what the law `ccr_bend` says of them; false where a cable cannot have its length.
+  static bool bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends);
+
+  // The curvatures of n segments seen by adjoints, what the law `ccr_bow` says.
+  static void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings, const Rows& adjoints, Rows& hessians);
+};
+
+}  // namespace ccr

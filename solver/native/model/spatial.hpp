@@ -1,0 +1,110 @@
+// The robot in space (eq. 13) at one trial shape: kinematics and objective, with their derivatives.
+#pragma once
+
+#include <vector>
+
+#include "math/riccati.hpp"
+#include "model/robot.hpp"
+#include "model/segment.hpp"
+
+namespace ccr {
+
+// Dynamics of a segment in its lower state: the identity, and the motion of the end of the chord as the disk turns.
+struct Sway {
+  Vec<3> chord;  // in the base frame
+};
+
+template <int N>
+Vec<N> times(const Sway& a, Vec<N> s) {
+  const Vec<3> motion = cross({{s[3], s[4], s[5]}}, a.chord);
+  for (int k = 0; k < 3; ++k) s[k] += motion[k];
+  return s;
+}
+
+template <int R, int N>
+Mat<R, N> times(Mat<R, N> m, const Sway& a) {
+  for (int r = 0; r < R; ++r) {
+    const Vec<3> moment = cross(a.chord, {{m(r, 0), m(r, 1), m(r, 2)}});
+    for (int k = 0; k < 3; ++k) m(r, 3 + k) += moment[k];
+  }
+  return m;
+}
+
+template <int N, int C>
+Mat<N, C> transpose_times(const Sway& a, Mat<N, C> m) {
+  for (int c = 0; c < C; ++c) {
+    const Vec<3> moment = cross(a.chord, {{m(0, c), m(1, c), m(2, c)}});
+    for (int k = 0; k < 3; ++k) m(3 + k, c) += moment[k];
+  }
+  return m;
+}
+
+// With two cables, each of which is shared equally among the segments, and lies opposite where its displacement is
+// negative. The controls of a segment are its shears and its twist; the cables give its bending.
+class Spatial {
+ public:
+  static constexpr int kSpace = 3, kTurn = 3, kControl = 3, kCables = 2;
+  static constexpr int kState = 6;  // place, and small turn about the axes of the base frame
+  static constexpr bool kRod = false;
+  static constexpr int kShears = 2;  // leading controls, the softest
+  static constexpr int kTip = 10;    // slopes of the free tip in each cable: place, and turn towards both cables
+
+  using Control = Vec<kControl>;
+  using State = Vec<kState>;
+  using Frame = Mat<3, 3>;  // axes of the disk, its columns
+  using System = Riccati<kState, kControl, Sway>;
+
+  explicit Spatial(const Robot& robot);
+
+  static Position<3> lever(const Frame& frame, const Vec<2>& line) {
+    Position<3> lever;
+    for (int k = 0; k < 3; ++k) lever[k] = frame(k, 0) * line[0] + frame(k, 1) * line[1];
+    return lever;
+  }
+
+  // Shape under a command; false where the cables cannot have their lengths.
+  bool evaluate(const Command<2>& command, const std::vector<Control>& controls);
+
+  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the pulls on each node.
+  void adjoin(const std::vector<State>& pulls);
+  // Both follow adjoin.
+  void curvature(System& system) const;
+  Vec<2> pull_slopes() const;  // of the Lagrangian in the size of the cable displacements
+
+  Vec<kTip> free_slopes(const Command<2>& command) const;
+
+  double widest_shear() const { return 1; }  // sine of it
+  double free_turn() const;  // of a segment that nothing touches, about
+  double segment_length() const { return inputs_.length; }
+
+  std::vector<State> states;
+  std::vector<Frame> frames;
+  std::vector<Control> gradient;
+  double objective = 0;
+  double steepest = 0;  // largest slope of the objective alone
+
+ private:
+  // What the law of a segment gives, in the frame of its lower disk.
+  struct Bend {
+    Vec<3> chord;
+    Mat<3, 3> rotation;
+    double objective;
+    Vec<3> objective_slope;
+    Mat<3, 3> chord_slope, turn_slope;
+    Vec<2> objective_pull_slope;
+    Mat<3, 2> chord_pull_slope, turn_pull_slope;
+  };
+
+  static_assert(sizeof(Bend) == SpatialLaw::kBend * sizeof(double));
+
+  void set_inputs(const Command<2>& command);
+
+  Robot robot_;
+  SegmentInputs inputs_{};
+  Rows controls_, bendings_, laws_, adjoints_;
+  mutable Rows hessians_;
+  std::vector<Bend> bends_;
+  std::vector<Vec<3>> forces_, moments_;  // adjoints of the state each segment leads to, in its lower disk's frame
+};
+
+}  // namespace ccr

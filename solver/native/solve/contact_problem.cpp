@@ -1,0 +1,381 @@
+#include "solve/contact_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "model/models.hpp"
+
+namespace ccr {
+
+template <class Model>
+void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> nodes,
+                  std::span<const typename Model::Frame> frames, std::vector<Position<Model::kSpace>>& points) {
+  const int stride = robot.between + 1;
+  auto* point = points.data();
+  for (const Vec<2>& line : robot.lines) {
+    for (int i = 0; i <= robot.segments; ++i) {
+      point[i * stride] = nodes[i];
+      point[i * stride] += Model::lever(frames[i], line);
+    }
+    for (int i = 0; i < robot.segments; ++i)
+      for (int k = 1; k < stride; ++k) {
+        const auto &here = point[i * stride], &next = point[(i + 1) * stride];
+        const double t = static_cast<double>(k) / stride;
+        for (int c = 0; c < Model::kSpace; ++c) point[i * stride + k][c] = here[c] + t * (next[c] - here[c]);
+      }
+    point += robot.positions();
+  }
+}
+
+template <class Model>
+Chain<Model>::Chain(const Robot& robot, int obstacles)
+    : robot_(robot),
+      model_(robot),
+      origin_(robot.segments + 1),
+      clear_(obstacles),
+      nodes_(robot.segments + 1),
+      points_(robot.points()),
+      gaps_(obstacles * points_.size() + Model::kRod * (1 + 2 * robot.segments), std::numeric_limits<double>::infinity()),
+      mount_of_(obstacles, -1),
+      pulls_(robot.segments + 1) {
+  near_.reserve(gaps_.size());
+  const int stride = robot.between + 1;
+  for (const Vec<2>& line : robot.lines) {
+    for (int k = 0; k < robot.positions(); ++k)
+      sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line});
+    reach_ = std::max(reach_, norm(line));
+  }
+  reach_ += tolerances::kReach * robot.max_length + (robot.between > 0 ? robot.max_length / robot.segments : 0);
+}
+
+template <class Model>
+void Chain<Model>::enter(std::span<const Obstacle> obstacles) {
+  obstacles_ = obstacles;
+  for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
+  near_.clear();
+  int mounts = 0;
+  for (std::size_t j = 0; j < obstacles.size(); ++j) mount_of_[j] = obstacles[j].mounted ? mounts++ : -1;
+  springs_.resize(mounts);
+  mount_origin_.resize(mounts);
+  displacements_.resize(mounts);
+  mount_gradient_.resize(mounts);
+}
+
+template <class Model>
+void Chain<Model>::look_around(std::span<const Position> nodes, const std::vector<Position>& mounts) {
+  std::copy(nodes.begin(), nodes.end(), origin_.begin());
+  mount_origin_ = mounts;
+  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
+    clear_[j] = clearance(obstacles_[j], nodes) - reach_;
+    if (mount_of_[j] >= 0) clear_[j] -= norm(mounts[mount_of_[j]]);
+  }
+}
+
+template <class Model>
+bool Chain<Model>::far(int obstacle, double motion) const {
+  const int mount = mount_of_[obstacle];
+  if (mount >= 0) motion += norm(minus(displacements_[mount], mount_origin_[mount]));
+  return clear_[obstacle] > drift_ + motion;
+}
+
+template <class Model>
+bool Chain<Model>::evaluate(const Iterate& at) {
+  if (!model_.evaluate(at.command, at.controls)) return false;
+  load_springs(at.mounts);
+  fence_energy_ = 0;
+  if (fenced_) raise_fence(at.controls);
+  for (int i = 0; i <= robot_.segments; ++i)
+    for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
+  place_points<Model>(robot_, nodes_, frames(), points_);
+  measure_gaps();
+  if constexpr (Model::kRod) measure_limits(at.command);
+  return true;
+}
+
+// Half of kFence times the square by which the squared shear, over its limit's, exceeds kFenceShear.
+template <class Model>
+void Chain<Model>::raise_fence(const std::vector<Control>& controls) {
+  fence_slope_.assign(controls.size(), {});
+  fence_curvature_.assign(controls.size(), {});
+  const double square = model_.widest_shear() * model_.widest_shear();
+  for (std::size_t i = 0; i < controls.size(); ++i) {
+    double shear = 0;
+    for (int k = 0; k < Model::kShears; ++k) shear += controls[i][k] * controls[i][k];
+    const double excess = shear / square - tolerances::kFenceShear;
+    if (excess <= 0) continue;
+    fence_energy_ += tolerances::kFence * excess * excess / 2;
+    const double rise = 2 * tolerances::kFence / square;
+    for (int r = 0; r < Model::kShears; ++r) {
+      fence_slope_[i][r] = rise * excess * controls[i][r];
+      fence_curvature_[i](r, r) = rise * excess;
+      for (int c = 0; c < Model::kShears; ++c) fence_curvature_[i](r, c) += 2 * rise / square * controls[i][r] * controls[i][c];
+    }
+  }
+  energy_ += fence_energy_;
+}
+
+template <class Model>
+void Chain<Model>::load_springs(const std::vector<Position>& mounts) {
+  displacements_ = mounts;
+  for (std::size_t j = 0; j < obstacles_.size(); ++j)
+    if (const int mount = mount_of_[j]; mount >= 0)
+      for (int k = 0; k < kSpace * kSpace; ++k) springs_[mount][k] = obstacles_[j].stiffness[k] / stiffness();
+  energy_ = objective() + spring_energy(mounts, model_.segment_length() * robot_.segments);
+}
+
+template <class Model>
+double Chain<Model>::spring_energy(const std::vector<Position>& mounts, double length) const {
+  double energy = 0;
+  for (std::size_t j = 0; j < obstacles_.size(); ++j)
+    if (const int mount = mount_of_[j]; mount >= 0)
+      energy += dot(mounts[mount], times(obstacles_[j].stiffness, mounts[mount])) / 2;
+  return energy / robot_.stiffness(length);
+}
+
+template <class Model>
+void Chain<Model>::relax(Iterate& at) {
+  at.active.count = 0;
+  std::fill(at.mounts.begin(), at.mounts.end(), Position{});
+  Control control{};
+  if constexpr (Model::kRod)
+    if (at.command.cables[0] > 0) {
+      control = model_.relaxed(at.command);
+      at.active.contact[0] = slack();
+      at.active.multiplier[0] = model_.relaxed_push();
+      at.active.count = 1;
+    }
+  std::fill(at.controls.begin(), at.controls.end(), control);
+}
+
+// Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
+template <class Model>
+void Chain<Model>::measure_gaps() {
+  const int n = robot_.segments, stride = robot_.between + 1;
+  for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
+  near_.clear();
+  double drift = 0;
+  for (int i = 0; i <= n; ++i) {
+    const Position motion = minus(nodes_[i], origin_[i]);
+    drift = std::max(drift, dot(motion, motion));
+  }
+  drift_ = std::sqrt(drift);
+  for (int j = 0; j < static_cast<int>(obstacles_.size()); ++j) {
+    if (far(j, 0)) continue;
+    const Obstacle& obstacle = obstacles_[j];
+    const Position moved = this->moved(j);
+    const int first = j * robot_.points();
+    for (int i = 0; i <= n; ++i) {
+      const double distance = clearance_beyond(obstacle, minus(nodes_[i], moved), reach_);
+      if (distance > 0) {
+        i += static_cast<int>(std::min(distance / model_.segment_length(), static_cast<double>(n)));
+        continue;
+      }
+      for (int start = i * stride; start < robot_.points(); start += robot_.positions())
+        for (int k = start; k < start + (i < n ? stride : 1); ++k) {
+          if (!obstacle.touchable[k]) continue;
+          ccr::measure_gaps(obstacle, std::span<const Position>(&points_[k], 1), moved, &gaps_[first + k]);
+          near_.push_back(first + k);
+        }
+    }
+  }
+}
+
+template <class Model>
+void Chain<Model>::measure_limits(const Command& command) requires(Model::kRod) {
+  const auto add = [this](int contact, double gap) {
+    gaps_[contact] = gap;
+    near_.push_back(contact);
+  };
+  add(slack(), model_.slack(command));
+  const double close = tolerances::kDisksClose * (model_.segment_length() - robot_.disk_thickness) / robot_.disk_radius;
+  if (model_.widest <= close) return;
+  for (int i = 0; i < robot_.segments; ++i) {
+    const double angle = states()[i][2] - states()[i + 1][2];
+    if (std::abs(angle) <= close) continue;
+    const int contact = disks() + 2 * i + (angle < 0);
+    add(contact, disk_gap(contact).value);
+  }
+}
+
+template <class Model>
+void Chain<Model>::survey(double* gaps) const {
+  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
+    ccr::measure_gaps(obstacles_[j], std::span<const Position>(points_), moved(static_cast<int>(j)), gaps);
+    for (std::size_t k = 0; k < points_.size() && !obstacles_[j].everywhere; ++k)
+      if (!obstacles_[j].touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
+    gaps += points_.size();
+  }
+}
+
+template <class Model>
+Chain<Model>::Position Chain<Model>::point(int contact) const {
+  const int mount = this->mount(contact);
+  const Position& point = points_[contact % points_.size()];
+  return mount < 0 ? point : minus(point, displacements_[mount]);
+}
+
+template <class Model>
+Gap<Chain<Model>::kSpace> Chain<Model>::gap(int contact) const {
+  return measure_gap(obstacle(contact), point(contact));
+}
+
+template <class Model>
+Chain<Model>::Slope Chain<Model>::slope(int contact) const {
+  if constexpr (Model::kRod) {
+    if (contact == slack()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
+    if (contact > slack()) {  // in the angle between two nodes
+      const double slope = disk_gap(contact).slope;
+      return {{(contact - disks()) / 2, true, {{0, 0, slope, 0}}, {{0, 0, -slope, 0}}}, -1, {}};
+    }
+  }
+  const Position normal = gap(contact).slope;
+  return {force(contact, normal), mount(contact), normal};
+}
+
+template <class Model>
+Chain<Model>::Force Chain<Model>::force(int contact, const Position& on_point) const {
+  const Site& site = this->site(contact);
+  const auto share = [&](double weight, int node) {
+    State share{};
+    const auto turn = moment(lever(site, node), on_point);
+    for (int k = 0; k < kSpace; ++k) share[k] = weight * on_point[k];
+    for (int k = 0; k < Model::kTurn; ++k) share[kSpace + k] = weight * turn[k];
+    return share;
+  };
+  const double t = site.fraction;
+  if (t == 0) return {site.node, false, share(1, site.node), {}};
+  return {site.node, true, share(1 - t, site.node), share(t, site.node + 1)};
+}
+
+template <class Model>
+double Chain<Model>::lever_arm(int contact) const {
+  if (contact == slack()) return robot_.offset * robot_.segments;
+  if (contact > slack()) return robot_.disk_radius;
+  const Site& site = this->site(contact);
+  return model_.segment_length() * (site.node + (site.fraction > 0));
+}
+
+template <class Model>
+bool Chain<Model>::touching(const ActiveSet& active) const {
+  const auto begin = active.contact.begin();
+  return std::any_of(begin, begin + active.count, [this](int contact) { return contact < contacts(); });
+}
+
+template <class Model>
+double Chain<Model>::violation() const {
+  double worst = 0;
+  for (const int contact : near_) worst = std::max(worst, -gaps_[contact]);
+  return worst;
+}
+
+template <class Model>
+double Chain<Model>::tolerance(const ActiveSet& active) const {
+  const double scale = Model::kRod ? model_.steepest : model_.free_turn() * model_.free_turn();
+  double pressed = model_.steepest;  // also by contacts
+  for (int j = 0; j < active.count; ++j)
+    pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));
+  return tolerances::kStationarity * scale + tolerances::kRoundoff * pressed;
+}
+
+template <class Model>
+void Chain<Model>::reduced_gradient(const ActiveSet& active) {
+  std::fill(pulls_.begin(), pulls_.end(), State{});
+  for (std::size_t m = 0; m < springs_.size(); ++m) mount_gradient_[m] = times(springs_[m], displacements_[m]);
+  for (int j = 0; j < active.count; ++j) {
+    const auto& [force, mount, normal] = slope(active.contact[j]);
+    if (mount >= 0)
+      for (int k = 0; k < kSpace; ++k) mount_gradient_[mount][k] += active.multiplier[j] * normal[k];
+    for (int k = 0; k < kState; ++k) {
+      pulls_[force.node][k] += active.multiplier[j] * force.here[k];
+      if (force.split) pulls_[force.node + 1][k] += active.multiplier[j] * force.next[k];
+    }
+  }
+  model_.adjoin(pulls_);
+  if (at_fence())
+    for (std::size_t i = 0; i < fence_slope_.size(); ++i) model_.gradient[i] += fence_slope_[i];
+}
+
+template <class Model>
+void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
+  model_.curvature(system);
+  if (at_fence())
+    for (std::size_t i = 0; i < fence_curvature_.size(); ++i) system.stages[i].huu += fence_curvature_[i];
+  for (int j = 0; j < active.count; ++j) {
+    const int contact = active.contact[j];
+    if constexpr (Model::kRod)
+      if (contact > slack()) add_disk_curvature(contact, -active.multiplier[j], system);
+    if (contact >= contacts()) continue;  // slack is linear in the state
+    const Gap<kSpace> gap = this->gap(contact);
+    const Site& site = this->site(contact);
+    const double scale = -active.multiplier[j];
+    // Its Hessian in the states of the nodes beside it: J_aᵀ C J_b, and the curvature of the turn of each lever.
+    const auto motion = [&](double weight, int node) {
+      Mat<kSpace, kState> slope;
+      const auto turn = swing(lever(site, node));
+      for (int r = 0; r < kSpace; ++r) {
+        slope(r, r) = weight;
+        for (int k = 0; k < Model::kTurn; ++k) slope(r, kSpace + k) = weight * turn(r, k);
+      }
+      return slope;
+    };
+    const auto add_turn = [&](double weight, int node) {
+      const auto turn = hessian_contraction(lever(site, node), gap.slope);
+      for (int r = 0; r < Model::kTurn; ++r)
+        for (int k = 0; k < Model::kTurn; ++k)
+          system.node_hessian[node](kSpace + r, kSpace + k) += scale * weight * turn(r, k);
+    };
+    const double t = site.fraction;
+    const int node = site.node;
+    const Mat<kSpace, kSpace> c = gap.curvature(scale);
+    const auto here = motion(1 - t, node);
+    system.node_hessian[node] += transpose_times(here, times(c, here));
+    add_turn(1 - t, node);
+    if (t == 0) continue;
+    const auto next = motion(t, node + 1);
+    system.node_hessian[node + 1] += transpose_times(next, times(c, next));
+    add_turn(t, node + 1);
+    system.couple(node, transpose_times(here, times(c, next)));
+  }
+}
+
+template <class Model>
+void Chain<Model>::add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod) {
+  const int node = (contact - disks()) / 2;
+  const double curvature = scale * disk_gap(contact).curvature;
+  Mat<kState, kState> cross;
+  cross(2, 2) = -curvature;
+  system.node_hessian[node](2, 2) += curvature;
+  system.node_hessian[node + 1](2, 2) += curvature;
+  system.couple(node, cross);
+}
+
+template <class Model>
+Chain<Model>::Tensions Chain<Model>::tensions(const ActiveSet& active) const {
+  Tensions tensions = model_.pull_slopes();
+  if constexpr (Model::kRod)
+    for (int j = 0; j < active.count; ++j)
+      if (active.contact[j] == slack()) tensions[0] = active.multiplier[j];
+  for (double& tension : tensions.v) tension *= stiffness();
+  return tensions;
+}
+
+template <class Model>
+Chain<Model>::Position Chain<Model>::push(const ActiveSet& active, int obstacle) const {
+  Position force{};
+  for (int j = 0; j < active.count; ++j) {
+    if (active.contact[j] >= contacts() || active.contact[j] / static_cast<int>(points_.size()) != obstacle) continue;
+    const Gap<kSpace> gap = this->gap(active.contact[j]);
+    for (int k = 0; k < kSpace; ++k) force[k] += stiffness() * active.multiplier[j] * gap.slope[k];
+  }
+  return force;
+}
+
+#define CCR_INSTANTIATE(Model)                                                                                   \
+  template class Chain<Model>;                                                                                   \
+  template void place_points<Model>(const Robot&, std::span<const Position<Model::kSpace>>,                      \
+                                    std::span<const Model::Frame>, std::vector<Position<Model::kSpace>>&);
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
+
+}  // namespace ccr

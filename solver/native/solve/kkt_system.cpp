@@ -1,0 +1,184 @@
+#include "solve/kkt_system.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/models.hpp"
+
+namespace ccr {
+
+using namespace tolerances;
+
+template <class Model>
+void Direction<Model>::clear() {
+  std::fill(controls.begin(), controls.end(), typename Model::Control{});
+  std::fill(states.begin(), states.end(), typename Model::State{});
+  std::fill(mounts.begin(), mounts.end(), Position<Model::kSpace>{});
+}
+
+template <class Model>
+void Direction<Model>::add(double scale, const Direction& other) {
+  for (std::size_t i = 0; i < controls.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k) controls[i][k] += scale * other.controls[i][k];
+  for (std::size_t i = 0; i < states.size(); ++i)
+    for (int k = 0; k < Model::kState; ++k) states[i][k] += scale * other.states[i][k];
+  for (std::size_t m = 0; m < other.mounts.size(); ++m)
+    for (int k = 0; k < Model::kSpace; ++k) mounts[m][k] += scale * other.mounts[m][k];
+}
+
+template <class Model>
+Hessian<Model>::Hessian(int segments, int mounts)
+    : system_(segments),
+      penalty_(kMaxActive),
+      mount_hessian_(mounts),
+      mount_factor_(mounts),
+      columns_(kSpace * mounts, Column{0, 0, {}, Direction(segments, 0)}),
+      schur_(kSpace * kSpace * mounts * mounts),
+      moves_(kSpace * mounts),
+      loads_(kMaxLoads) {
+  for (Column& column : columns_) column.forces.reserve(kMaxActive);
+}
+
+namespace {
+
+template <int N>
+Mat<N, N> outer(double scale, const Vec<N>& a, const Vec<N>& b) {
+  Mat<N, N> product;
+  for (int r = 0; r < N; ++r)
+    for (int c = 0; c < N; ++c) product(r, c) = scale * a[r] * b[c];
+  return product;
+}
+
+}  // namespace
+
+template <class Model>
+void Hessian<Model>::shape(const Chain& chain, const ActiveSet& active, double strength) {
+  chain.curvature(active, system_);
+  steepest_ = 0;
+  for (const auto& stage : system_.stages)
+    for (int k = 0; k < Model::kShears; ++k) steepest_ = std::max(steepest_, std::abs(stage.huu(k, k)));
+  for (int j = 0; j < active.count; ++j) {
+    const Force slope = chain.slope(active.contact[j]).force;
+    const double arm = chain.lever_arm(active.contact[j]);
+    penalty_[j] = strength * steepest_ / (arm * arm);
+    system_.node_hessian[slope.node] += outer(penalty_[j], slope.here, slope.here);
+    if (!slope.split) continue;
+    system_.node_hessian[slope.node + 1] += outer(penalty_[j], slope.next, slope.next);
+    system_.couple(slope.node, outer(penalty_[j], slope.here, slope.next));
+  }
+  shape_mounts(chain, active);
+}
+
+// A point on a mounted obstacle has the Hessian -λ∇²c + penalty ∇c∇cᵀ in its place; so has the mount, and the two of
+// them together the opposite.
+template <class Model>
+void Hessian<Model>::shape_mounts(const Chain& chain, const ActiveSet& active) {
+  touched_ = 0;
+  arm_ = chain.robot().max_length / chain.robot().segments;
+  for (std::size_t m = 0; m < mount_hessian_.size(); ++m) mount_hessian_[m] = chain.spring(m);
+  if (mount_hessian_.empty()) return;
+  for (int j = 0; j < active.count; ++j) {
+    const int mount = chain.mount(active.contact[j]);
+    if (mount < 0) continue;
+    int first = 0;
+    while (first < touched_ && columns_[first].mount != mount) first += kSpace;
+    if (first == touched_) {
+      touched_ += kSpace;
+      for (int k = 0; k < kSpace; ++k) {
+        columns_[first + k].mount = mount;
+        columns_[first + k].axis = k;
+        columns_[first + k].forces.clear();
+      }
+    }
+    const Gap<kSpace> gap = chain.gap(active.contact[j]);
+    Mat<kSpace, kSpace> stiffening = gap.curvature(active.multiplier[j]);
+    stiffening -= outer(penalty_[j], gap.slope, gap.slope);
+    mount_hessian_[mount] -= stiffening;
+    for (int k = 0; k < kSpace; ++k) {
+      Position<kSpace> column;
+      for (int r = 0; r < kSpace; ++r) column[r] = stiffening(r, k);
+      columns_[first + k].forces.push_back(chain.force(active.contact[j], column));
+    }
+  }
+}
+
+template <class Model>
+bool Hessian<Model>::factor(double damping) {
+  ++factorizations;
+  return system_.factor(damping) && (mount_hessian_.empty() || factor_mounts(damping / (arm_ * arm_)));
+}
+
+template <class Model>
+bool Hessian<Model>::factor_mounts(double damping) {
+  for (std::size_t m = 0; m < mount_hessian_.size(); ++m) {
+    mount_factor_[m] = mount_hessian_[m];
+    for (int k = 0; k < kSpace; ++k) mount_factor_[m](k, k) += damping;
+  }
+  for (int a = 0; a < touched_; ++a) {
+    Column& column = columns_[a];
+    loads_[a] = {nullptr, column.forces, column.response.controls.data(), column.response.states.data()};
+  }
+  system_.respond(std::span(loads_).first(touched_));
+  for (int a = 0; a < touched_; ++a)
+    for (int b = 0; b <= a; ++b) {
+      double entry = 0;
+      if (columns_[a].mount == columns_[b].mount)
+        entry = mount_factor_[columns_[a].mount](columns_[a].axis, columns_[b].axis);
+      for (const Force& force : columns_[a].forces) entry -= force.along(columns_[b].response.states);
+      for (int k = 0; k < b; ++k) entry -= schur_[a * touched_ + k] * schur_[b * touched_ + k];
+      if (a == b && !(entry > 0)) return false;
+      schur_[a * touched_ + b] = a == b ? std::sqrt(entry) : entry / schur_[b * touched_ + b];
+    }
+  for (Mat<kSpace, kSpace>& factor : mount_factor_)
+    if (!factorize(factor)) return false;
+  return true;
+}
+
+// From the response of the chain alone, and the load of the mounts in their place, to that of all together.
+template <class Model>
+void Hessian<Model>::complete(Direction& response) {
+  for (int a = 0; a < touched_; ++a) {
+    moves_[a] = response.mounts[columns_[a].mount][columns_[a].axis];
+    for (const Force& force : columns_[a].forces) moves_[a] -= force.along(response.states);
+    for (int k = 0; k < a; ++k) moves_[a] -= schur_[a * touched_ + k] * moves_[k];
+    moves_[a] /= schur_[a * touched_ + a];
+  }
+  for (int a = touched_ - 1; a >= 0; --a) {
+    for (int k = a + 1; k < touched_; ++k) moves_[a] -= schur_[k * touched_ + a] * moves_[k];
+    moves_[a] /= schur_[a * touched_ + a];
+  }
+  for (std::size_t m = 0; m < mount_factor_.size(); ++m) solve_factored(mount_factor_[m], response.mounts[m]);
+  for (int a = 0; a < touched_; ++a) {
+    response.mounts[columns_[a].mount][columns_[a].axis] = moves_[a];
+    response.add(-moves_[a], columns_[a].response);
+  }
+}
+
+template <class Model>
+void Hessian<Model>::respond(const Chain& chain, std::span<const Load> loads) {
+  for (std::size_t k = 0; k < loads.size(); ++k) {
+    Direction& response = *loads[k].response;
+    const Slope* gap = loads[k].gap;
+    loads_[k] = {gap ? nullptr : chain.gradient().data(), gap ? std::span(&gap->force, 1) : std::span<const Force>(),
+                 response.controls.data(), response.states.data()};
+  }
+  system_.respond(std::span(loads_).first(loads.size()));
+  if (mount_hessian_.empty()) return;
+  for (const Load& load : loads) {
+    std::vector<Position<kSpace>>& mounts = load.response->mounts;
+    for (std::size_t m = 0; m < mounts.size(); ++m) {
+      mounts[m] = {};
+      if (!load.gap) mounts[m] -= chain.mount_gradient()[m];
+      if (load.gap && load.gap->mount == static_cast<int>(m)) mounts[m] -= load.gap->normal;
+    }
+    complete(*load.response);
+  }
+}
+
+#define CCR_INSTANTIATE(Model)     \
+  template struct Direction<Model>; \
+  template class Hessian<Model>;
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
+
+}  // namespace ccr

@@ -1,0 +1,80 @@
+// A chain at a random shape, with contacts that lie where a test wants them.
+#pragma once
+
+#include <doctest/doctest.h>
+
+#include "solve/contact_problem.hpp"
+#include "dense.hpp"
+#include "solve/kkt_system.hpp"
+#include "model/models.hpp"
+#include "random.hpp"
+#include "robots.hpp"
+
+namespace ccr::testing {
+
+template <class Model>
+RobotNumbers numbers_of(int segments) {
+  RobotNumbers of;
+  of.sliding = Model::kRod;
+  of.segments = segments;
+  of.length = 10 * segments;
+  return of;
+}
+
+// Cables pulled by a twentieth of their segments, and controls close to those of the free robot.
+template <class Model>
+Iterate<Model> random_shape(Random& random, const RobotNumbers& of, int mounts, double size) {
+  Iterate<Model> at;
+  for (double& cable : at.command.cables.v) cable = 0.4 * of.segments;
+  at.command.length = of.length;
+  at.controls.resize(of.segments);
+  for (auto& control : at.controls) {
+    control = random.matrix<Model::kControl>(size);
+    if (Model::kRod) control[0] += 0.05;
+  }
+  at.mounts.resize(mounts);
+  for (auto& mount : at.mounts) mount = random.matrix<Model::kSpace>(0.5);
+  return at;
+}
+
+// The nodes of a chain, measured as the broad phase takes them.
+template <class Model>
+void look_around(Chain<Model>& chain, const Iterate<Model>& at) {
+  std::vector<Position<Model::kSpace>> nodes(chain.states().size());
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    for (int k = 0; k < Model::kSpace; ++k) nodes[i][k] = chain.states()[i][k];
+  chain.look_around(nodes, at.mounts);
+}
+
+// All unknowns one after the other: controls, then mounts.
+template <class Model>
+Column flat(const std::vector<typename Model::Control>& controls, const std::vector<Position<Model::kSpace>>& mounts) {
+  Column out;
+  for (const auto& control : controls) out.insert(out.end(), control.v.begin(), control.v.end());
+  for (const auto& mount : mounts) out.insert(out.end(), mount.v.begin(), mount.v.end());
+  return out;
+}
+
+template <class Model>
+void move(Iterate<Model>& at, std::size_t unknown, double by) {
+  const std::size_t controls = at.controls.size() * Model::kControl;
+  if (unknown < controls)
+    at.controls[unknown / Model::kControl][static_cast<int>(unknown % Model::kControl)] += by;
+  else
+    at.mounts[(unknown - controls) / Model::kSpace][static_cast<int>((unknown - controls) % Model::kSpace)] += by;
+}
+
+template <class Model>
+std::size_t unknowns(const Iterate<Model>& at) {
+  return at.controls.size() * Model::kControl + at.mounts.size() * Model::kSpace;
+}
+
+// Slope of the Lagrangian at a shape, in all unknowns.
+template <class Model>
+Column lagrangian_slope(Chain<Model>& chain, const Iterate<Model>& at) {
+  REQUIRE(chain.evaluate(at));
+  chain.reduced_gradient(at.active);
+  return flat<Model>(chain.gradient(), chain.mount_gradient());
+}
+
+}  // namespace ccr::testing

@@ -1,0 +1,237 @@
+// Active-set problems built backwards from their answer: the shape is free, the gaps are walls that one point each can
+// touch, so that a wall's normal gives its gradient and its offset any gap that is wanted. A sliding cable is one more
+// gap, its slack, which the displacement sets.
+#include <algorithm>
+
+#include "problems.hpp"
+#include "solve/active_set_qp.hpp"
+
+namespace ccr::testing {
+namespace {
+
+constexpr double kLargest = 2e-5;  // multiplier of a wall, which leaves the curvature positive [rad²/mm]
+constexpr double kTaut = 0.0125;   // of a cable that holds the shape, about
+constexpr double kAway = 0.002;    // coordinates from where nothing moves, so that the step stays within reach of the walls
+
+template <class Model>
+struct Wanted {
+  static constexpr int kSpace = Model::kSpace;
+  using Direction = ccr::Direction<Model>;
+  using Slope = typename Chain<Model>::Slope;
+
+  Wanted(Random& random, int walls)
+      : of(numbers_of<Model>(8)), robot(make_robot(of, {{{0, 0}}})), chain(robot, walls),
+        at(random_shape<Model>(random, of, 0, kAway)), hessian(of.segments, 0), step(of.segments, 0), normals(walls),
+        points(walls), gaps(walls + Model::kRod) {
+    for (int j = 0; j < walls; ++j) {
+      normals[j] = random.template direction<kSpace>();
+      points[j] = 1 + (j * 3) % of.segments;
+    }
+    if (!Model::kRod) return;
+    at.active.contact[0] = chain.contacts();
+    at.active.multiplier[0] = kTaut;
+    at.active.count = 1;
+  }
+
+  int walls() const { return static_cast<int>(points.size()); }
+  int count() const { return static_cast<int>(gaps.size()); }
+  int contact(int gap) const { return gap == walls() ? chain.contacts() : gap * robot.points() + points[gap]; }
+  Slope slope(int gap) const { return chain.slope(contact(gap)); }
+
+  // Puts the walls where the gaps are as wanted.
+  void place() {
+    REQUIRE(chain.evaluate(at));
+    if constexpr (Model::kRod) at.command.cables[0] = chain.states().back()[3] - gaps.back();
+    obstacles.clear();
+    for (int j = 0; j < walls(); ++j)
+      obstacles.push_back(for_point(wall<kSpace>(robot, normals[j], dot(normals[j], chain.points()[points[j]]) - gaps[j]), points[j]));
+    chain.enter(obstacles);
+    look_around(chain, at);
+    REQUIRE(chain.evaluate(at));
+    chain.reduced_gradient(at.active);
+    hessian.shape(chain, at.active, 0);
+    REQUIRE(hessian.factor(0));
+  }
+
+  Direction respond(const Slope* slope) {
+    Direction out(of.segments, 0);
+    const typename Hessian<Model>::Load load{slope, &out};
+    hessian.respond(chain, {&load, 1});
+    return out;
+  }
+
+  // The step from the present multipliers to these, and gaps that make it the answer: closed under it where something
+  // pushes, open by `slack` where it does not.
+  void choose(const std::vector<double>& multipliers, double slack) {
+    std::fill(gaps.begin(), gaps.end(), 0);
+    place();
+    step = respond(nullptr);
+    std::vector<double> change = multipliers;
+    for (int j = 0; j < count(); ++j) change[j] -= this->multipliers(at.active)[j];
+    push(change, step);
+    for (int j = 0; j < count(); ++j) gaps[j] = (multipliers[j] > 0 ? 0 : slack) - slope(j).along(step);
+    place();
+  }
+
+  // Some of the walls push already.
+  void warm(Random& random) {
+    for (int j = 0; j < walls(); ++j)
+      if (random.chance(0.4)) {
+        at.active.contact[at.active.count] = contact(j);
+        at.active.multiplier[at.active.count++] = random.uniform(0, kLargest);
+      }
+  }
+
+  // Adds what multipliers do to a step.
+  void push(const std::vector<double>& multipliers, Direction& to) {
+    for (int j = 0; j < count(); ++j) {
+      const Slope slope = this->slope(j);
+      to.add(multipliers[j], respond(&slope));
+    }
+  }
+
+  // Of each gap, from an active set.
+  std::vector<double> multipliers(const ActiveSet& active) const {
+    std::vector<double> out(gaps.size());
+    for (int j = 0; j < active.count; ++j) {
+      const int contact = active.contact[j];
+      out[contact == chain.contacts() ? walls() : contact / robot.points()] = active.multiplier[j];
+    }
+    return out;
+  }
+
+  double error(const Direction& found) const {
+    return apart(flat<Model>(found.controls, found.mounts), flat<Model>(step.controls, step.mounts));
+  }
+  double size() const { return largest(flat<Model>(step.controls, step.mounts)); }
+
+  RobotNumbers of;
+  Robot robot;
+  Chain<Model> chain;
+  Iterate<Model> at;
+  Hessian<Model> hessian;
+  Direction step;
+  std::vector<Vec<kSpace>> normals;
+  std::vector<int> points;
+  std::vector<double> gaps;
+  std::vector<Obstacle<kSpace>> obstacles;
+};
+
+// Of some of the walls, and of a sliding cable.
+template <class Model>
+std::vector<double> choose(Random& random, int walls, double pushing) {
+  std::vector<double> out(static_cast<std::size_t>(walls));
+  for (double& one : out) one = random.chance(pushing) ? random.uniform(0.1, 1) * kLargest : 0;
+  if (Model::kRod) out.push_back(random.uniform(0.99, 1.01) * kTaut);
+  return out;
+}
+
+template <class Model>
+void chosen_sets() {
+  Random random(1);
+  int pushed = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const int walls = random.integer(1, Model::kSpace == 2 ? 5 : 8);
+    Wanted<Model> wanted(random, walls);
+    const std::vector<double> multipliers = choose<Model>(random, walls, 0.5);
+    if (trial % 3 > 0) wanted.warm(random);
+    wanted.choose(multipliers, 0.3);
+    Contacts<Model> contacts(wanted.of.segments, 0);
+    ActiveSet active = wanted.at.active;
+    Direction<Model> step(wanted.of.segments, 0);
+    REQUIRE(contacts.solve(wanted.chain, wanted.hessian, active, step));
+    CHECK(wanted.error(step) <= 1e-8 * wanted.size());
+    const std::vector<double> found = wanted.multipliers(active);
+    for (int j = 0; j < wanted.count(); ++j) CHECK(std::abs(found[j] - multipliers[j]) <= 1e-7 * kLargest);
+    pushed += active.count;
+  }
+  CHECK(pushed > 100);
+}
+
+// Where walls coincide, or more of them meet in a point than it can move in directions, their multipliers are many but
+// the step is one.
+template <class Model>
+void dependent_gaps() {
+  Random random(2);
+  for (int trial = 0; trial < 100; ++trial) {
+    constexpr int kWalls = Model::kSpace + 3;
+    Wanted<Model> wanted(random, kWalls);
+    wanted.points.assign(kWalls, 5);
+    wanted.normals[1] = wanted.normals[0];
+    const std::vector<double> multipliers = choose<Model>(random, kWalls, 0.7);
+    if (trial % 2) wanted.warm(random);
+    wanted.choose(multipliers, random.chance(0.5) ? 0 : 0.2);  // closed without pushing, or open
+    Contacts<Model> contacts(wanted.of.segments, 0);
+    ActiveSet active = wanted.at.active;
+    Direction<Model> step(wanted.of.segments, 0);
+    REQUIRE(contacts.solve(wanted.chain, wanted.hessian, active, step));
+    CHECK(wanted.error(step) <= 1e-7 * wanted.size());
+    CHECK(active.count <= Model::kSpace + Model::kRod);
+    std::vector<double> found = wanted.multipliers(active);
+    CHECK(*std::min_element(found.begin(), found.end()) >= 0);
+    Direction<Model> pushed(wanted.of.segments, 0);  // by all walls together, more than was wanted
+    for (int j = 0; j < wanted.count(); ++j) found[j] -= multipliers[j];
+    wanted.push(found, pushed);
+    CHECK(largest(flat<Model>(pushed.controls, pushed.mounts)) <= 1e-6 * wanted.size());
+  }
+}
+
+template <class Model>
+void no_answer() {
+  Random random(3);
+  Wanted<Model> wanted(random, 2);
+  wanted.points = {5, 5};
+  for (int k = 0; k < Model::kSpace; ++k) wanted.normals[1][k] = -wanted.normals[0][k];
+  wanted.gaps[0] = wanted.gaps[1] = -0.1;  // a point on the wrong side of two walls that face each other
+  wanted.place();
+  Contacts<Model> contacts(wanted.of.segments, 0);
+  ActiveSet active = wanted.at.active;
+  Direction<Model> step(wanted.of.segments, 0);
+  CHECK_FALSE(contacts.solve(wanted.chain, wanted.hessian, active, step));
+}
+
+// The smallest step, measured by the Hessian, that closes the gaps which are held.
+template <class Model>
+void restorations() {
+  Random random(4);
+  for (int trial = 0; trial < 50; ++trial) {
+    Wanted<Model> wanted(random, 3);
+    for (double& gap : wanted.gaps) gap = random.uniform(-0.1, 0.1);
+    wanted.gaps[2] = 2;  // not held, and open
+    wanted.place();
+    ActiveSet active = wanted.at.active;
+    for (int j = 0; j < 2; ++j) active.contact[active.count++] = wanted.contact(j);
+    const int held = active.count;
+    Contacts<Model> contacts(wanted.of.segments, 0);
+    Direction<Model> step(wanted.of.segments, 0);
+    REQUIRE(contacts.restore(wanted.chain, wanted.hessian, active, step));
+    // A combination of the responses to the held gaps: as many equations for its parts.
+    Dense gram(held, held);
+    Column shortfall(static_cast<std::size_t>(held));
+    std::vector<typename Wanted<Model>::Slope> slopes;
+    for (int j = 0; j < held; ++j) {
+      slopes.push_back(wanted.chain.slope(active.contact[j]));
+      shortfall[j] = -wanted.chain.gaps()[active.contact[j]];
+      CHECK(std::abs(shortfall[j] - slopes[j].along(step)) <= 1e-11);
+    }
+    for (int c = 0; c < held; ++c) {
+      const Direction<Model> response = wanted.respond(&slopes[c]);
+      for (int r = 0; r < held; ++r) gram(r, c) = slopes[r].along(response);
+    }
+    REQUIRE(cholesky(gram) > 1e-9);
+    const Column parts = solve_cholesky(gram, shortfall);
+    wanted.step.clear();
+    for (int j = 0; j < held; ++j) wanted.step.add(parts[j], wanted.respond(&slopes[j]));
+    CHECK(wanted.error(step) <= 1e-6 * wanted.size());
+  }
+}
+
+#define CCR_MODELS Planar<PaperLaw>, Planar<RodLaw>, Spatial
+
+TEST_CASE_TEMPLATE("the active set and multipliers are those that were chosen", Model, CCR_MODELS) { chosen_sets<Model>(); }
+TEST_CASE_TEMPLATE("gaps that depend on each other leave the step alone", Model, CCR_MODELS) { dependent_gaps<Model>(); }
+TEST_CASE_TEMPLATE("a problem without an answer is given up", Model, CCR_MODELS) { no_answer<Model>(); }
+TEST_CASE_TEMPLATE("a restoration is the smallest step that closes the gaps", Model, CCR_MODELS) { restorations<Model>(); }
+
+}  // namespace
+}  // namespace ccr::testing

@@ -1,0 +1,172 @@
+// A chain among obstacles, fixed and on springs: its slopes and its Hessian against differences, dense.
+#include "problems.hpp"
+
+namespace ccr::testing {
+namespace {
+
+constexpr double kDifference = 1e-6;
+
+template <class Model>
+struct Touched {
+  static constexpr int kSpace = Model::kSpace;
+
+  // A round obstacle on each of a few points, the first two of them on springs, the last beside the middle of an edge.
+  explicit Touched(Random& random)
+      : of(numbers(random)), robot(make_robot<kSpace>(of)), chain(robot, kObstacles),
+        at(random_shape<Model>(random, of, kSprings, 0.05)) {
+    REQUIRE(chain.evaluate({at.command, at.controls, {}, {}}));
+    for (int j = 0; j < kObstacles; ++j) {
+      point[j] = random.integer(0, 1) * robot.positions() + random.integer(4, robot.positions() - 1);
+      Position<kSpace> center = chain.points()[point[j]];
+      const Vec<kSpace> way = random.template direction<kSpace>();
+      const bool mounted = j < kSprings;
+      for (int k = 0; k < kSpace; ++k) center[k] += 6 * way[k] - (mounted ? at.mounts[j][k] : 0);
+      obstacles.push_back(make_ball(center, 6, mounted ? random.uniform(0.5, 5) : 0));
+      at.active.contact[j] = j * robot.points() + point[j];
+      at.active.multiplier[j] = random.decades(-7, -3);
+    }
+    at.active.count = kObstacles;
+    chain.enter(obstacles);
+    look_around(chain, at);
+    if constexpr (Model::kRod) {
+      at.active.contact[kObstacles] = chain.contacts();
+      at.active.multiplier[at.active.count++] = 0.02;
+    }
+    REQUIRE(chain.evaluate(at));
+  }
+
+  static RobotNumbers numbers(Random& random) {
+    RobotNumbers of = numbers_of<Model>(random.integer(4, 7));
+    of.between = random.integer(0, 2);
+    return of;
+  }
+
+  Obstacle<kSpace> make_ball(const Position<kSpace>& center, double r, double stiffness) const {
+    if constexpr (kSpace == 2)
+      return circle(robot, center[0], center[1], r, stiffness);
+    else
+      return sphere(robot, center[0], center[1], center[2], r, stiffness);
+  }
+
+  // Energy and springs less what the contacts hold.
+  double lagrangian(const Iterate<Model>& there) {
+    REQUIRE(chain.evaluate(there));
+    double value = chain.energy();
+    for (int j = 0; j < at.active.count; ++j) value -= at.active.multiplier[j] * chain.gaps()[at.active.contact[j]];
+    return value;
+  }
+
+  // Of a function of the shape by central differences, one column for each unknown.
+  template <class Function>
+  Dense differences(int rows, Function function) {
+    const int n = static_cast<int>(unknowns(at));
+    Dense out(rows, n);
+    for (int k = 0; k < n; ++k) {
+      Iterate<Model> there = at;
+      move(there, k, kDifference);
+      const Column more = function(there);
+      move(there, k, -2 * kDifference);
+      const Column less = function(there);
+      for (int r = 0; r < rows; ++r) out(r, k) = (more[r] - less[r]) / (2 * kDifference);
+    }
+    return out;
+  }
+
+  static constexpr int kObstacles = 4, kSprings = 2;
+
+  RobotNumbers of;
+  Robot robot;
+  std::vector<Obstacle<kSpace>> obstacles;
+  Chain<Model> chain;
+  Iterate<Model> at;
+  std::array<int, kObstacles> point;
+};
+
+template <class Model>
+void slopes() {
+  Random random(1);
+  for (int trial = 0; trial < 10; ++trial) {
+    Touched<Model> touched(random);
+    const Column slope = lagrangian_slope(touched.chain, touched.at);
+    const Dense found = touched.differences(1, [&](const auto& there) { return Column{touched.lagrangian(there)}; });
+    for (std::size_t k = 0; k < slope.size(); ++k) CHECK(std::abs(slope[k] - found(0, static_cast<int>(k))) <= 1e-7);
+  }
+}
+
+// Of a step, what the Hessian by differences makes of it must be what was asked for.
+template <class Model>
+void hessian() {
+  Random random(2);
+  int definite = 0;
+  for (int trial = 0; trial < 30; ++trial) {
+    Touched<Model> touched(random);
+    Chain<Model>& chain = touched.chain;
+    const int n = static_cast<int>(unknowns(touched.at));
+    Dense expected = touched.differences(n, [&](const auto& there) { return lagrangian_slope(chain, there); });
+    const Column slope = lagrangian_slope(chain, touched.at);
+    std::vector<Column> gap_slopes;
+    const Dense gaps = touched.differences(touched.at.active.count, [&](const auto& there) {
+      REQUIRE(chain.evaluate(there));
+      Column out;
+      for (int j = 0; j < touched.at.active.count; ++j) out.push_back(chain.gaps()[touched.at.active.contact[j]]);
+      return out;
+    });
+    lagrangian_slope(chain, touched.at);
+
+    Hessian<Model> system(touched.robot.segments, touched.kSprings);
+    const double strength = trial % 2 ? 0 : 10;
+    system.shape(chain, touched.at.active, strength);
+    for (int j = 0; j < touched.at.active.count; ++j)
+      for (int r = 0; r < n; ++r)
+        for (int c = 0; c < n; ++c) expected(r, c) += system.penalty(j) * gaps(j, r) * gaps(j, c);
+    Dense factor = expected;
+    for (int r = 0; r < n; ++r)  // symmetric but for the differences
+      for (int c = 0; c < n; ++c) factor(r, c) = (expected(r, c) + expected(c, r)) / 2;
+    const double pivot = cholesky(factor);
+    if (std::abs(pivot) < 1e-6) continue;
+    CHECK(system.factor(0) == (pivot > 0));
+    if (pivot < 0) continue;
+    ++definite;
+
+    using Slope = typename Chain<Model>::Slope;
+    std::vector<Slope> loads;
+    std::vector<Direction<Model>> responses(touched.at.active.count + 1, Direction<Model>(touched.robot.segments, touched.kSprings));
+    for (int j = 0; j < touched.at.active.count; ++j) loads.push_back(chain.slope(touched.at.active.contact[j]));
+    std::vector<typename Hessian<Model>::Load> asked = {{nullptr, &responses.back()}};
+    for (int j = 0; j < touched.at.active.count; ++j) asked.push_back({&loads[j], &responses[j]});
+    system.respond(chain, asked);
+    const auto compare = [&](const Direction<Model>& response, const Column& right) {
+      const Column made = product(expected, flat<Model>(response.controls, response.mounts));
+      CHECK(apart(made, right) <= 1e-5 * (largest(right) + largest(flat<Model>(response.controls, response.mounts))));
+    };
+    Column down = slope;
+    for (double& part : down) part = -part;
+    compare(responses.back(), down);
+    for (int j = 0; j < touched.at.active.count; ++j) {
+      Column row;
+      for (int c = 0; c < n; ++c) row.push_back(gaps(j, c));
+      compare(responses[j], row);
+      for (int k = 0; k < touched.at.active.count; ++k)  // motion of the gaps along the response
+        CHECK(loads[k].along(responses[j]) ==
+              doctest::Approx([&] {
+                double along = 0;
+                const Column moved = flat<Model>(responses[j].controls, responses[j].mounts);
+                for (int c = 0; c < n; ++c) along += gaps(k, c) * moved[c];
+                return along;
+              }()).epsilon(1e-5).scale(std::abs(loads[j].along(responses[j]))));
+    }
+  }
+  CHECK(definite >= 5);
+}
+
+TEST_CASE_TEMPLATE("the slope of the Lagrangian is that of its value", Model, Planar<PaperLaw>, Planar<RodLaw>, Spatial) {
+  slopes<Model>();
+}
+
+TEST_CASE_TEMPLATE("the Hessian is that of the Lagrangian, springs and penalties included", Model, Planar<PaperLaw>,
+                   Planar<RodLaw>, Spatial) {
+  hessian<Model>();
+}
+
+}  // namespace
+}  // namespace ccr::testing
