@@ -32,7 +32,7 @@ class Recording {
 template <int D>
 int replay(Recording& recording) {
   ccr::testing::RobotNumbers numbers;
-  numbers.sliding = recording.count() != 0;
+  numbers.rod = recording.count() != 0;
   numbers.segments = recording.count();
   numbers.length = recording.number();
   numbers.offset = recording.number();
@@ -47,12 +47,12 @@ int replay(Recording& recording) {
       const int size = recording.count();
       obstacles.push_back(ccr::testing::make_obstacle<D>(robot, shape, recording.numbers(size)));
     }
-    const auto follower = ccr::make_follower<D>(robot, static_cast<int>(obstacles.size()));
-    follower->enter(obstacles);
-    std::vector<double> to(follower->block_size());
+    const auto continuation = ccr::make_continuation<D>(robot, static_cast<int>(obstacles.size()));
+    continuation->set_obstacles(obstacles);
+    std::vector<double> to(continuation->layout().size);
     for (int left = recording.count(); left > 0; --left, ++steps) {
       const std::vector<double> command = recording.numbers(D), from = recording.numbers(to.size());
-      follower->follow(from.data(), command.data(), to.data());
+      continuation->follow(from.data(), command.data(), to.data());
     }
   }
   return steps;

@@ -17,23 +17,23 @@ template <int D>
 class Batch {
  public:
   Batch(const Robot& robot, int count, int obstacles, int threads) : scenes_(count), pool_(threads - 1) {
-    for (int k = 0; k < threads; ++k) workers_.push_back(make_follower<D>(robot, obstacles));
+    for (int k = 0; k < threads; ++k) workers_.push_back(make_continuation<D>(robot, obstacles));
   }
 
-  std::size_t block_size() const { return workers_[0]->block_size(); }
+  const BlockLayout& layout() const { return workers_[0]->layout(); }
   std::vector<Obstacle<D>>& scene(int robot) { return scenes_[robot]; }
 
-  // Calls `work` with a follower among the obstacles of each of some robots, and the place of the robot in the list, until
+  // Calls `work` with a continuation among the obstacles of each of some robots, and the place of the robot in the list, until
   // the calling thread is told to `stop`.
   template <class Work, class Stop>
   void each(const std::vector<int>& robots, Work work, Stop&& stop) {
     std::atomic<int> next = 0;
     const int count = static_cast<int>(robots.size());
     const auto run = [&](int thread) {
-      Follower<D>& worker = *workers_[thread];
+      Continuation<D>& worker = *workers_[thread];
       for (int first; (first = next.fetch_add(kChunk)) < count;) {
         for (int k = first; k < std::min(first + kChunk, count); ++k) {
-          worker.enter(scenes_[robots[k]]);
+          worker.set_obstacles(scenes_[robots[k]]);
           work(worker, k);
         }
         if (thread == 0 && stop()) next = count;
@@ -54,7 +54,7 @@ class Batch {
   static constexpr int kAlone = 16;  // robots that are not worth waking a thread for
 
   std::vector<std::vector<Obstacle<D>>> scenes_;
-  std::vector<std::unique_ptr<Follower<D>>> workers_;
+  std::vector<std::unique_ptr<Continuation<D>>> workers_;
   Pool pool_;
 };
 

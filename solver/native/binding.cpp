@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "batch.hpp"
+#include "tolerances.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -33,12 +34,12 @@ using Numbers = std::array<double, D>;  // a command: cables, then length
 
 template <int D>
 std::vector<ccr::Obstacle<D>> read_obstacles(const Kinds& kinds, const Input& parameters, const Input& extents,
-                                             const Mask& touchable, const Input& stiffness, const Addresses& laws,
+                                             const Mask& touchable, const Input& springs, const Addresses& laws,
                                              const Outlines& outlines) {
   const std::size_t count = kinds.size(), points = touchable.shape(1);
   if (parameters.size() != ccr::kShapeSize * count || extents.size() != (D + 3) * count || touchable.shape(0) != count ||
-      stiffness.size() != D * D * count || laws.size() != count || outlines.size() != count)
-    throw std::invalid_argument("one row of parameters, extents, touchable points, stiffness, law and outline per obstacle");
+      springs.size() != D * D * count || laws.size() != count || outlines.size() != count)
+    throw std::invalid_argument("one row of parameters, extents, touchable points, springs, law and outline per obstacle");
   std::vector<ccr::Obstacle<D>> obstacles(count);
   for (std::size_t i = 0; i < count; ++i) {
     ccr::Obstacle<D>& obstacle = obstacles[i];
@@ -47,16 +48,16 @@ std::vector<ccr::Obstacle<D>> read_obstacles(const Kinds& kinds, const Input& pa
     std::copy_n(parameters.data() + ccr::kShapeSize * i, ccr::kShapeSize, obstacle.parameters.begin());
     std::copy_n(extent, D, obstacle.center.v.begin());
     obstacle.radius = extent[D];
-    obstacle.fineness = extent[D + 1];
+    obstacle.min_curvature_radius = extent[D + 1];
     obstacle.inradius = extent[D + 2];
     for (std::size_t k = 0; k + D <= outlines[i].size(); k += D) {
       ccr::Position<D> point;
       std::copy_n(outlines[i].data() + k, D, point.v.begin());
       obstacle.outline.push_back(point);
     }
-    std::copy_n(stiffness.data() + D * D * i, D * D, obstacle.stiffness.v.begin());
+    std::copy_n(springs.data() + D * D * i, D * D, obstacle.spring.v.begin());
     obstacle.law = reinterpret_cast<ccr::Law>(laws[i]);
-    obstacle.mounted = obstacle.stiffness(0, 0) > 0;
+    obstacle.mounted = obstacle.spring(0, 0) > 0;
     obstacle.touchable.assign(touchable.data() + points * i, touchable.data() + points * (i + 1));
     const auto& can = obstacle.touchable;
     obstacle.everywhere = std::find(can.begin(), can.end(), 0) == can.end();
@@ -130,31 +131,29 @@ template <int D>
 class Kernel {
  public:
   Kernel(const ccr::Robot& robot, std::vector<ccr::Obstacle<D>> scene)
-      : scene_(std::move(scene)), branch_(ccr::make_follower<D>(robot, static_cast<int>(scene_.size()))) {
-    branch_->enter(scene_);
+      : scene_(std::move(scene)), continuation_(ccr::make_continuation<D>(robot, static_cast<int>(scene_.size()))) {
+    continuation_->set_obstacles(scene_);
   }
 
-  std::size_t block_size() const { return branch_->block_size(); }
+  std::size_t block_size() const { return continuation_->layout().size; }
 
   std::tuple<int, int, int> step(const Input& from, const Numbers<D>& command, const Output& to) {
     expect(from);
     expect(to.size());
-    const ccr::Status status = branch_->follow(from.data(), command.data(), to.data());
-    return {static_cast<int>(status), branch_->iterations, branch_->factorizations};
+    const ccr::StepResult result = continuation_->follow(from.data(), command.data(), to.data());
+    return {static_cast<int>(result.status), result.iterations, result.factorizations};
   }
 
   std::tuple<std::vector<double>, int> trace(const Input& from, const Numbers<D>& command) {
     expect(from);
-    std::vector<double> shapes, to(branch_->block_size());
-    branch_->trace = &shapes;
-    branch_->follow(from.data(), command.data(), to.data());
-    branch_->trace = nullptr;
-    return {std::move(shapes), static_cast<int>(branch_->reason)};
+    std::vector<double> shapes, to(continuation_->layout().size);
+    const ccr::StepResult result = continuation_->trace(from.data(), command.data(), to.data(), shapes);
+    return {std::move(shapes), static_cast<int>(result.reason)};
   }
 
   std::array<double, 3> optimality(const Input& block) {
     expect(block);
-    const ccr::Optimality found = branch_->optimality(block.data());
+    const ccr::Optimality found = continuation_->optimality(block.data());
     return {found.stationarity, found.gap, found.complementarity};
   }
 
@@ -165,11 +164,11 @@ class Kernel {
   }
 
   void expect(std::size_t size) const {
-    if (size != branch_->block_size()) throw std::invalid_argument("block of the wrong size for this robot and scene");
+    if (size != continuation_->layout().size) throw std::invalid_argument("block of the wrong size for this robot and scene");
   }
 
   std::vector<ccr::Obstacle<D>> scene_;
-  std::unique_ptr<ccr::Follower<D>> branch_;
+  std::unique_ptr<ccr::Continuation<D>> continuation_;
 };
 
 using Blocks = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
@@ -196,36 +195,37 @@ class Fleet {
     const Turn turn(busy_);
     const std::size_t count = count_;
     if (commands.shape(0) != count || commands.shape(1) != D || blocks.shape(0) != count ||
-        blocks.shape(1) != batch_.block_size() || statuses.shape(0) != count || iterations.shape(0) != count || factorizations.shape(0) != count)
+        blocks.shape(1) != batch_.layout().size || statuses.shape(0) != count || iterations.shape(0) != count || factorizations.shape(0) != count)
       throw std::invalid_argument("one row of commands, blocks, statuses, iterations and factorizations for each robot");
     expect(robots);
     double* block = blocks.data();
     const double* command = commands.data();
     std::int64_t *status = statuses.data(), *counted = iterations.data(), *factored = factorizations.data();
-    const std::size_t size = batch_.block_size();
+    const std::size_t size = batch_.layout().size;
     for (const int robot : robots) {
       expect_sound<D>(block + size * robot);
       expect_sound<D>(command + D * robot);
     }
-    each(robots, [&](ccr::Follower<D>& follower, int k) {
+    each(robots, [&](ccr::Continuation<D>& continuation, int k) {
       const int i = robots[k];
-      status[i] = static_cast<int>(follower.follow(block + size * i, command + D * i, block + size * i));
-      counted[i] = follower.iterations;
-      factored[i] = follower.factorizations;
+      const ccr::StepResult result = continuation.follow(block + size * i, command + D * i, block + size * i);
+      status[i] = static_cast<int>(result.status);
+      counted[i] = result.iterations;
+      factored[i] = result.factorizations;
     });
   }
 
   void optimality(const Blocks& blocks, const Blocks& found) {
     const Turn turn(busy_);
-    if (blocks.shape(0) != static_cast<std::size_t>(count_) || blocks.shape(1) != batch_.block_size() ||
+    if (blocks.shape(0) != static_cast<std::size_t>(count_) || blocks.shape(1) != batch_.layout().size ||
         found.shape(0) != blocks.shape(0) || found.shape(1) != 3)
       throw std::invalid_argument("one row of three numbers for each robot");
     std::vector<int> all(count_);
-    for (int i = 0; i < count_; ++i) expect_sound<D>(blocks.data() + batch_.block_size() * (all[i] = i));
+    for (int i = 0; i < count_; ++i) expect_sound<D>(blocks.data() + batch_.layout().size * (all[i] = i));
     const double* block = blocks.data();
     double* to = found.data();
-    each(all, [&](ccr::Follower<D>& follower, int k) {
-      const ccr::Optimality at = follower.optimality(block + batch_.block_size() * k);
+    each(all, [&](ccr::Continuation<D>& continuation, int k) {
+      const ccr::Optimality at = continuation.optimality(block + batch_.layout().size * k);
       const double numbers[] = {at.stationarity, at.gap, at.complementarity};
       std::copy_n(numbers, 3, to + 3 * k);
     });
@@ -241,8 +241,8 @@ class Fleet {
     std::vector<int> found(robots.size());
     const double *force = forces.data(), *direction = directions.data();
     double* to = reached.data();
-    each(robots, [&](ccr::Follower<D>& follower, int k) {
-      found[k] = follower.reaches(force[k], obstacle, direction + (D - 1) * k, increment, limit, length, to + D * k);
+    each(robots, [&](ccr::Continuation<D>& continuation, int k) {
+      found[k] = continuation.ramp_reaches_force({force[k], obstacle, direction + (D - 1) * k, increment, limit, length}, to + D * k);
     });
     return found;
   }
@@ -275,10 +275,10 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
   nb::class_<Scene<D>>(m, scene, "Obstacles as the kernel takes them, each a row of the arrays.")
       .def("__init__",
            [](Scene<D>* self, const Kinds& kinds, const Input& parameters, const Input& extents, const Mask& touchable,
-              const Input& stiffness, const Addresses& laws, const Outlines& outlines) {
-             new (self) Scene<D>{read_obstacles<D>(kinds, parameters, extents, touchable, stiffness, laws, outlines)};
+              const Input& springs, const Addresses& laws, const Outlines& outlines) {
+             new (self) Scene<D>{read_obstacles<D>(kinds, parameters, extents, touchable, springs, laws, outlines)};
            },
-           "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "stiffness"_a, "laws"_a, "outlines"_a);
+           "kinds"_a, "parameters"_a, "extents"_a, "touchable"_a, "springs"_a, "laws"_a, "outlines"_a);
   nb::class_<Kernel<D>> solver(m, kernel, "Solver of one robot in one scene; holds scratch memory and no state between calls.");
   solver
       .def("__init__",
@@ -323,19 +323,19 @@ void bind(nb::module_& m, const char* gaps, const char* scene, const char* kerne
 
 NB_MODULE(_kernel, m) {
   nb::set_leak_warnings(false);  // of objects that caches keep until the interpreter ends
-  m.doc() = "Chain solver: Riccati-Newton SQP on the reduced coordinates, followed along a branch.";
+  m.doc() = "ContactProblem solver: Riccati-Newton SQP on the reduced coordinates, followed along a branch.";
   m.attr("SHAPES") = ccr::kShapeNames;
   m.attr("SHAPE_SIZE") = ccr::kShapeSize;
   m.attr("MAX_ACTIVE") = ccr::tolerances::kMaxActive;
   nb::class_<ccr::Robot>(m, "Robot", "A robot as the kernel takes it.")
       .def("__init__",
-           [](ccr::Robot* self, bool sliding, int segments, double offset, double angle, double rigidity,
+           [](ccr::Robot* self, bool rod, int segments, double offset, double angle, double rigidity,
               double max_tension, double max_length, double disk_radius, double disk_thickness,
               const std::vector<Numbers<2>>& lines, const std::vector<double>& edges, int between) {
              if (edges.size() != lines.size() || lines.empty()) throw std::invalid_argument("a longest edge for each line");
              std::vector<ccr::Vec<2>> places;
              for (const Numbers<2>& line : lines) places.push_back({line});
-             new (self) ccr::Robot{sliding, segments, offset, angle, rigidity, max_tension, max_length, disk_radius, disk_thickness, places,
+             new (self) ccr::Robot{rod ? ccr::ModelKind::kRod : ccr::ModelKind::kPaper, segments, offset, angle, rigidity, max_tension, max_length, disk_radius, disk_thickness, places,
                                   edges, between};
            },
            "sliding"_a, "segments"_a, "offset"_a, "angle"_a, "rigidity"_a, "max_tension"_a, "max_length"_a,

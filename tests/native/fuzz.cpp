@@ -36,17 +36,17 @@ struct Tally {
 };
 
 template <int D>
-const char* fault(const Robot& robot, const View<D>& view, int status, const std::vector<double>& block) {
+const char* fault(const Robot& robot, const BlockLayout& layout, int status, const std::vector<double>& block) {
   if (status < 0 || status >= kStatuses) return "a status that there is not";
   for (const double number : block)
     if (!std::isfinite(number)) return "a number that is not finite";
-  if (view.contacts > 0 && block[view.clearance] < kLeastGap * robot.max_length) return "a point in an obstacle";
-  for (std::size_t c = 0; c < view.contacts; ++c) {
-    if (block[view.multipliers + c] < 0) return "a contact that pulls";
-    if (block[view.gaps + c] < block[view.clearance]) return "a gap below the smallest one";
+  if (layout.gaps.size > 0 && block[layout.clearance.offset] < kLeastGap * robot.max_length) return "a point in an obstacle";
+  for (std::size_t c = 0; c < layout.gaps.size; ++c) {
+    if (block[layout.multipliers.offset + c] < 0) return "a contact that pulls";
+    if (block[layout.gaps.offset + c] < block[layout.clearance.offset]) return "a gap below the smallest one";
   }
   for (int k = 0; k < D - 1; ++k) {
-    const double tension = block[view.tensions + k];
+    const double tension = block[layout.tensions.offset + k];
     if (!(tension <= robot.max_tension * (1 + kLimitBand)) && block[k] != 0) return "a tension beyond its limit";
   }
   return nullptr;
@@ -63,32 +63,32 @@ template <int D>
 bool run(Random& random, Clock::time_point end, Tally& tally) {
   const RobotNumbers of = random_robot<D>(random);
   const Setting<D> setting = random_setting<D>(random, of, random.integer(1, 6));
-  const auto follower = make_follower<D>(setting.robot, static_cast<int>(setting.obstacles.size()));
-  follower->enter(setting.obstacles);
-  const View<D> view(setting.robot, setting.obstacles.size());
+  const auto continuation = make_continuation<D>(setting.robot, static_cast<int>(setting.obstacles.size()));
+  continuation->set_obstacles(setting.obstacles);
+  const BlockLayout& layout = continuation->layout();
   std::vector<double> now = setting.rest, to = now;
   Commands<D> commands(random, of);
   for (int step = 0; step < kSteps && Clock::now() < end; ++step) {
     const std::array<double, D> command = commands.next(now);
-    const int status = static_cast<int>(follower->follow(now.data(), command.data(), to.data()));
-    const int iterations = follower->iterations, factorizations = follower->factorizations;
-    const char* why = fault<D>(setting.robot, view, status, to);
-    const Optimality optimality = follower->optimality(to.data());
+    const StepResult result = continuation->follow(now.data(), command.data(), to.data());
+    const int status = static_cast<int>(result.status);
+    const char* why = fault<D>(setting.robot, layout, status, to);
+    const Optimality optimality = continuation->optimality(to.data());
     if (!why) why = fault(optimality);
     if (why) {
       std::fprintf(stderr, "fuzz: %s in step %d (status %d, robot of %.4g mm, %d segments, %s, %zu obstacles)\n", why, step,
-                   status, of.length, of.segments, D == 3 ? "space" : of.sliding ? "sliding" : "uniform",
+                   status, of.length, of.segments, D == 3 ? "space" : of.rod ? "rod" : "paper",
                    setting.obstacles.size());
       std::fprintf(stderr, "fuzz: tension %.12g of its limit, stationarity %.3g, gap %.3g L, complementarity %.3g\n",
-                   to[view.tensions] / of.max_tension, optimality.stationarity, optimality.gap, optimality.complementarity);
+                   to[layout.tensions.offset] / of.max_tension, optimality.stationarity, optimality.gap, optimality.complementarity);
       return false;
     }
     ++tally.steps;
     ++tally.statuses[status];
     tally.seen[status] = present;
-    tally.iterations += iterations;
-    tally.hardest = std::max(tally.hardest, factorizations);
-    tally.touching += std::any_of(&to[view.force], &to[view.force] + D, [](double part) { return part != 0; });
+    tally.iterations += result.iterations;
+    tally.hardest = std::max(tally.hardest, result.factorizations);
+    tally.touching += std::any_of(&to[layout.force.offset], &to[layout.force.offset] + D, [](double part) { return part != 0; });
     std::swap(now, to);
   }
   return true;

@@ -1,4 +1,4 @@
-// A chain at a random shape, with contacts that lie where a test wants them.
+// A problem at a random shape, with contacts that lie where a test wants them.
 #pragma once
 
 #include <doctest/doctest.h>
@@ -15,7 +15,7 @@ namespace ccr::testing {
 template <class Model>
 RobotNumbers numbers_of(int segments) {
   RobotNumbers of;
-  of.sliding = Model::kRod;
+  of.rod = Model::kRod;
   of.segments = segments;
   of.length = 10 * segments;
   return of;
@@ -37,13 +37,13 @@ Iterate<Model> random_shape(Random& random, const RobotNumbers& of, int mounts, 
   return at;
 }
 
-// The nodes of a chain, measured as the broad phase takes them.
+// The nodes of a problem, measured as the broad phase takes them.
 template <class Model>
-void look_around(Chain<Model>& chain, const Iterate<Model>& at) {
-  std::vector<Position<Model::kSpace>> nodes(chain.states().size());
+void update_broadphase(ContactProblem<Model>& problem, const Iterate<Model>& at) {
+  std::vector<Position<Model::kSpace>> nodes(problem.states().size());
   for (std::size_t i = 0; i < nodes.size(); ++i)
-    for (int k = 0; k < Model::kSpace; ++k) nodes[i][k] = chain.states()[i][k];
-  chain.look_around(nodes, at.mounts);
+    for (int k = 0; k < Model::kSpace; ++k) nodes[i][k] = problem.states()[i][k];
+  problem.update_broadphase(nodes, at.mounts);
 }
 
 // All unknowns one after the other: controls, then mounts.
@@ -71,10 +71,10 @@ std::size_t unknowns(const Iterate<Model>& at) {
 
 // Slope of the Lagrangian at a shape, in all unknowns.
 template <class Model>
-Column lagrangian_slope(Chain<Model>& chain, const Iterate<Model>& at) {
-  REQUIRE(chain.evaluate(at));
-  chain.reduced_gradient(at.active);
-  return flat<Model>(chain.gradient(), chain.mount_gradient());
+Column lagrangian_slope(ContactProblem<Model>& problem, const Iterate<Model>& at) {
+  REQUIRE(problem.evaluate(at));
+  problem.reduced_gradient(at.active);
+  return flat<Model>(problem.gradient(), problem.mount_gradient());
 }
 
 }  // namespace ccr::testing

@@ -21,7 +21,7 @@ inline constexpr double kQuarterTurn = 1.5707963267948966;
 
 // The numbers that describe a robot; those of the paper's prototype unless told.
 struct RobotNumbers {
-  bool sliding = false;
+  bool rod = false;
   int segments = 18;
   double length = 180, offset = 8, rigidity = 5000, max_tension = 15;
   double angle = kQuarterTurn;  // between the cables, in space
@@ -33,8 +33,8 @@ inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
   const double segment = of.length / of.segments;
   std::vector<double> edges;  // stretched by as much as the disks of a segment can turn, about
   for (const Vec<2>& line : lines)
-    edges.push_back((segment + norm(line) * (of.sliding ? segment / of.offset : 0.4)) / (of.between + 1));
-  return {.sliding = of.sliding,
+    edges.push_back((segment + norm(line) * (of.rod ? segment / of.offset : 0.4)) / (of.between + 1));
+  return {.model = of.rod ? ModelKind::kRod : ModelKind::kPaper,
           .segments = of.segments,
           .offset = of.offset,
           .angle = of.angle,
@@ -53,7 +53,9 @@ template <int D>
 Robot make_robot(const RobotNumbers& of) {
   const double a = of.offset, x = a * std::cos(of.angle), y = a * std::sin(of.angle);
   if (D == 2) return make_robot(of, {{{0, 0}}, {{a, 0}}});
-  return make_robot(of, {{{0, 0}}, {{a, 0}}, {{x, y}}, {{-a, 0}}, {{-x, -y}}});
+  Robot robot = make_robot(of, {{{0, 0}}, {{a, 0}}, {{x, y}}, {{-a, 0}}, {{-x, -y}}});
+  robot.model = ModelKind::kSpatial;
+  return robot;
 }
 
 template <int D>
@@ -74,7 +76,7 @@ Position<D> middle(const Position<D>& a, const Position<D>& b) {
 template <int D>
 struct Extent {
   Position<D> center;
-  double radius, fineness;
+  double radius, min_curvature_radius;
 };
 
 template <int D>
@@ -135,23 +137,23 @@ inline std::vector<Position<2>> ellipse_outline(const double* p) {
 }
 
 // An obstacle that all points of a robot can touch, from its shape as the gap laws take it. On a spring where
-// `stiffness` is positive [N/mm].
+// `spring` is positive [N/mm].
 template <int D>
-Obstacle<D> make_obstacle(const Robot& robot, Shape shape, std::span<const double> parameters, double stiffness = 0) {
+Obstacle<D> make_obstacle(const Robot& robot, Shape shape, std::span<const double> parameters, double spring = 0) {
   const Extent<D> extent = extent_of(shape, parameters.data(), Position<D>{});
   Obstacle<D> obstacle{};
   obstacle.shape = shape;
   std::copy(parameters.begin(), parameters.end(), obstacle.parameters.begin());
   obstacle.center = extent.center;
   obstacle.radius = extent.radius;
-  obstacle.fineness = extent.fineness;
+  obstacle.min_curvature_radius = extent.min_curvature_radius;
   if constexpr (D == 2)
     if (shape == Shape::kEllipse) obstacle.outline = ellipse_outline(parameters.data());
   obstacle.inradius = obstacle.wall() ? kInfinity : depth(obstacle, obstacle.center);
   obstacle.touchable.assign(robot.points(), 1);
   obstacle.everywhere = true;
-  obstacle.mounted = stiffness > 0;
-  for (int k = 0; k < D; ++k) obstacle.stiffness(k, k) = stiffness;
+  obstacle.mounted = spring > 0;
+  for (int k = 0; k < D; ++k) obstacle.spring(k, k) = spring;
   return obstacle;
 }
 
@@ -164,21 +166,21 @@ Obstacle<D> for_point(Obstacle<D> obstacle, int point) {
   return obstacle;
 }
 
-inline Obstacle<2> circle(const Robot& robot, double x, double y, double r, double stiffness = 0) {
-  return make_obstacle<2>(robot, Shape::kCircle, std::array{x, y, r}, stiffness);
+inline Obstacle<2> circle(const Robot& robot, double x, double y, double r, double spring = 0) {
+  return make_obstacle<2>(robot, Shape::kCircle, std::array{x, y, r}, spring);
 }
 
-inline Obstacle<3> sphere(const Robot& robot, double x, double y, double z, double r, double stiffness = 0) {
-  return make_obstacle<3>(robot, Shape::kSphere, std::array{x, y, z, r}, stiffness);
+inline Obstacle<3> sphere(const Robot& robot, double x, double y, double z, double r, double spring = 0) {
+  return make_obstacle<3>(robot, Shape::kSphere, std::array{x, y, z, r}, spring);
 }
 
 // Half of the plane or of space: outward unit normal and offset.
 template <int D>
-Obstacle<D> wall(const Robot& robot, const Position<D>& normal, double offset, double stiffness = 0) {
+Obstacle<D> wall(const Robot& robot, const Position<D>& normal, double offset, double spring = 0) {
   std::array<double, D + 1> parameters;
   std::copy(normal.v.begin(), normal.v.end(), parameters.begin());
   parameters[D] = offset;
-  return make_obstacle<D>(robot, D == 2 ? Shape::kHalfPlane : Shape::kHalfSpace, parameters, stiffness);
+  return make_obstacle<D>(robot, D == 2 ? Shape::kHalfPlane : Shape::kHalfSpace, parameters, spring);
 }
 
 }  // namespace ccr::testing

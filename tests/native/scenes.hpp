@@ -25,8 +25,8 @@ inline int disc_law(const double** in, double** out, int*, double*, int) {
   return 0;
 }
 
-inline Obstacle<2> make_custom(const Robot& robot, const Position<2>& center, double r, double stiffness) {
-  Obstacle<2> obstacle = circle(robot, center[0], center[1], r, stiffness);
+inline Obstacle<2> make_custom(const Robot& robot, const Position<2>& center, double r, double spring) {
+  Obstacle<2> obstacle = circle(robot, center[0], center[1], r, spring);
   obstacle.shape = Shape::kCustom;
   obstacle.law = disc_law;
   obstacle.outline = ellipse_outline(std::array{center[0], center[1], r, r, 1.0, 0.0}.data());
@@ -35,9 +35,9 @@ inline Obstacle<2> make_custom(const Robot& robot, const Position<2>& center, do
 
 // Obstacles of one of the shapes, about as large as a ball of radius r at a place; walls face the straight robot.
 inline Obstacle<2> random_obstacle(Random& random, const Robot& robot, int shape, const Position<2>& at, double r,
-                                   double stiffness) {
+                                   double spring) {
   const auto made = [&](Shape kind, std::initializer_list<double> numbers) {
-    return make_obstacle<2>(robot, kind, std::vector<double>(numbers), stiffness);
+    return make_obstacle<2>(robot, kind, std::vector<double>(numbers), spring);
   };
   const Vec<2> way = random.direction<2>();
   switch (shape) {
@@ -56,16 +56,16 @@ inline Obstacle<2> random_obstacle(Random& random, const Robot& robot, int shape
         const double angle = turned + 2 * std::numbers::pi * std::min(k, corners - 1) / corners;
         numbers.insert(numbers.end(), {at[0] + 2 * r * std::cos(angle), at[1] + 2 * r * std::sin(angle)});
       }
-      return make_obstacle<2>(robot, Shape::kPolygon, numbers, stiffness);
+      return make_obstacle<2>(robot, Shape::kPolygon, numbers, spring);
     }
-    default: return make_custom(robot, at, r, stiffness);
+    default: return make_custom(robot, at, r, spring);
   }
 }
 
 inline Obstacle<3> random_obstacle(Random& random, const Robot& robot, int shape, const Position<3>& at, double r,
-                                   double stiffness) {
+                                   double spring) {
   const auto made = [&](Shape kind, std::initializer_list<double> numbers) {
-    return make_obstacle<3>(robot, kind, std::vector<double>(numbers), stiffness);
+    return make_obstacle<3>(robot, kind, std::vector<double>(numbers), spring);
   };
   const Vec<3> way = random.direction<3>();
   const double edge = r * random.decades(-2, -0.3);
@@ -96,7 +96,7 @@ template <int D>
 RobotNumbers random_robot(Random& random, double decades = 3) {
   const double scale = random.decades(-decades, decades);
   RobotNumbers of;
-  of.sliding = D == 2 && random.chance(0.5);
+  of.rod = D == 2 && random.chance(0.5);
   of.segments = random.integer(6, 30);
   of.length = 180 * scale;
   of.offset = of.length * random.uniform(0.03, 0.07);
@@ -115,37 +115,20 @@ struct Setting {
 };
 
 template <int D>
-std::vector<double> rest_block(Follower<D>& follower, double length) {
-  std::vector<double> block(follower.block_size());
+std::vector<double> rest_block(Continuation<D>& continuation, double length) {
+  std::vector<double> block(continuation.layout().size);
   std::array<double, D> command{};
-  command[D - 1] = block[D - 1] = length;
-  follower.follow(block.data(), command.data(), block.data());
+  command[D - 1] = block[continuation.layout().length.offset] = length;
+  continuation.follow(block.data(), command.data(), block.data());
   return block;
 }
-
-// Where the numbers that tests look at stand in a block; the order is that of Follower::block_size.
-template <int D>
-struct View {
-  static constexpr int kCables = D - 1, kControls = D == 2 ? 1 : 3, kFrame = D == 2 ? 2 : 9;
-
-  View(const Robot& robot, std::size_t obstacles)
-      : contacts(obstacles * robot.points()),
-        tensions(kCables + 1),
-        multipliers(2 * kCables + 2 + robot.segments * kControls + (3 + kFrame) * (robot.segments + 1)),
-        gaps(multipliers + contacts),
-        forces(gaps + contacts + D * obstacles),
-        force(forces + D * obstacles),
-        clearance(force + D) {}
-
-  std::size_t contacts, tensions, multipliers, gaps, forces, force, clearance;
-};
 
 // Some obstacles beside the straight robot, clear of it, wide enough not to slip between its points.
 template <int D>
 Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, double springs = 0.2) {
   Setting<D> out{make_robot<D>(of), {}, {}};
   const double longest = *std::max_element(out.robot.edges.begin(), out.robot.edges.end());
-  const auto follower = make_follower<D>(out.robot, 1);
+  const auto continuation = make_continuation<D>(out.robot, 1);
   for (int tries = 0; static_cast<int>(out.obstacles.size()) < count && tries < 200; ++tries) {
     Position<D> at = random.direction<D>();
     const double out_of = of.length * random.uniform(0.12, 0.4);
@@ -155,14 +138,14 @@ Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, dou
     at[D - 1] = of.length * random.uniform(0.3, 0.95);
     const double r = std::max(of.length * random.uniform(0.04, 0.1), 0.55 * longest);
     const double unit = of.rigidity / (of.length * of.length * of.length);
-    const double stiffness = random.chance(springs) ? unit * random.decades(0, 4) : 0;
-    const std::vector<Obstacle<D>> alone = {random_obstacle(random, out.robot, random.integer(0, kShapes<D> - 1), at, r, stiffness)};
-    follower->enter(alone);
-    const std::vector<double> rest = rest_block(*follower, of.length);
-    if (rest[View<D>(out.robot, 1).clearance] > 1e-3 * of.length) out.obstacles.push_back(alone[0]);
+    const double spring = random.chance(springs) ? unit * random.decades(0, 4) : 0;
+    const std::vector<Obstacle<D>> alone = {random_obstacle(random, out.robot, random.integer(0, kShapes<D> - 1), at, r, spring)};
+    continuation->set_obstacles(alone);
+    const std::vector<double> rest = rest_block(*continuation, of.length);
+    if (rest[continuation->layout().clearance.offset] > 1e-3 * of.length) out.obstacles.push_back(alone[0]);
   }
-  const auto among = make_follower<D>(out.robot, static_cast<int>(out.obstacles.size()));
-  among->enter(out.obstacles);
+  const auto among = make_continuation<D>(out.robot, static_cast<int>(out.obstacles.size()));
+  among->set_obstacles(out.obstacles);
   out.rest = rest_block(*among, of.length);
   return out;
 }

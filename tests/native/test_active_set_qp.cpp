@@ -17,46 +17,46 @@ template <class Model>
 struct Wanted {
   static constexpr int kSpace = Model::kSpace;
   using Direction = ccr::Direction<Model>;
-  using Slope = typename Chain<Model>::Slope;
+  using Slope = typename ContactProblem<Model>::Slope;
 
   Wanted(Random& random, int walls)
-      : of(numbers_of<Model>(8)), robot(make_robot(of, {{{0, 0}}})), chain(robot, walls),
-        at(random_shape<Model>(random, of, 0, kAway)), hessian(of.segments, 0), step(of.segments, 0), normals(walls),
+      : of(numbers_of<Model>(8)), robot(make_robot(of, {{{0, 0}}})), problem(robot, walls),
+        at(random_shape<Model>(random, of, 0, kAway)), kkt(of.segments, 0), step(of.segments, 0), normals(walls),
         points(walls), gaps(walls + Model::kRod) {
     for (int j = 0; j < walls; ++j) {
       normals[j] = random.template direction<kSpace>();
       points[j] = 1 + (j * 3) % of.segments;
     }
     if (!Model::kRod) return;
-    at.active.contact[0] = chain.contacts();
+    at.active.contact[0] = problem.contacts();
     at.active.multiplier[0] = kTaut;
     at.active.count = 1;
   }
 
   int walls() const { return static_cast<int>(points.size()); }
   int count() const { return static_cast<int>(gaps.size()); }
-  int contact(int gap) const { return gap == walls() ? chain.contacts() : gap * robot.points() + points[gap]; }
-  Slope slope(int gap) const { return chain.slope(contact(gap)); }
+  int contact(int gap) const { return gap == walls() ? problem.contacts() : gap * robot.points() + points[gap]; }
+  Slope slope(int gap) const { return problem.slope(contact(gap)); }
 
   // Puts the walls where the gaps are as wanted.
   void place() {
-    REQUIRE(chain.evaluate(at));
-    if constexpr (Model::kRod) at.command.cables[0] = chain.states().back()[3] - gaps.back();
+    REQUIRE(problem.evaluate(at));
+    if constexpr (Model::kRod) at.command.cables[0] = problem.states().back()[3] - gaps.back();
     obstacles.clear();
     for (int j = 0; j < walls(); ++j)
-      obstacles.push_back(for_point(wall<kSpace>(robot, normals[j], dot(normals[j], chain.points()[points[j]]) - gaps[j]), points[j]));
-    chain.enter(obstacles);
-    look_around(chain, at);
-    REQUIRE(chain.evaluate(at));
-    chain.reduced_gradient(at.active);
-    hessian.shape(chain, at.active, 0);
-    REQUIRE(hessian.factor(0));
+      obstacles.push_back(for_point(wall<kSpace>(robot, normals[j], dot(normals[j], problem.points()[points[j]]) - gaps[j]), points[j]));
+    problem.set_obstacles(obstacles);
+    update_broadphase(problem, at);
+    REQUIRE(problem.evaluate(at));
+    problem.reduced_gradient(at.active);
+    kkt.assemble(problem, at.active, 0);
+    REQUIRE(kkt.factor(0));
   }
 
   Direction respond(const Slope* slope) {
     Direction out(of.segments, 0);
-    const typename Hessian<Model>::Load load{slope, &out};
-    hessian.respond(chain, {&load, 1});
+    const typename KktSystem<Model>::Load load{slope, &out};
+    kkt.solve(problem, {&load, 1});
     return out;
   }
 
@@ -68,7 +68,7 @@ struct Wanted {
     step = respond(nullptr);
     std::vector<double> change = multipliers;
     for (int j = 0; j < count(); ++j) change[j] -= this->multipliers(at.active)[j];
-    push(change, step);
+    add_responses(change, step);
     for (int j = 0; j < count(); ++j) gaps[j] = (multipliers[j] > 0 ? 0 : slack) - slope(j).along(step);
     place();
   }
@@ -83,7 +83,7 @@ struct Wanted {
   }
 
   // Adds what multipliers do to a step.
-  void push(const std::vector<double>& multipliers, Direction& to) {
+  void add_responses(const std::vector<double>& multipliers, Direction& to) {
     for (int j = 0; j < count(); ++j) {
       const Slope slope = this->slope(j);
       to.add(multipliers[j], respond(&slope));
@@ -95,7 +95,7 @@ struct Wanted {
     std::vector<double> out(gaps.size());
     for (int j = 0; j < active.count; ++j) {
       const int contact = active.contact[j];
-      out[contact == chain.contacts() ? walls() : contact / robot.points()] = active.multiplier[j];
+      out[contact == problem.contacts() ? walls() : contact / robot.points()] = active.multiplier[j];
     }
     return out;
   }
@@ -107,9 +107,9 @@ struct Wanted {
 
   RobotNumbers of;
   Robot robot;
-  Chain<Model> chain;
+  ContactProblem<Model> problem;
   Iterate<Model> at;
-  Hessian<Model> hessian;
+  KktSystem<Model> kkt;
   Direction step;
   std::vector<Vec<kSpace>> normals;
   std::vector<int> points;
@@ -136,10 +136,10 @@ void chosen_sets() {
     const std::vector<double> multipliers = choose<Model>(random, walls, 0.5);
     if (trial % 3 > 0) wanted.warm(random);
     wanted.choose(multipliers, 0.3);
-    Contacts<Model> contacts(wanted.of.segments, 0);
+    ActiveSetQp<Model> qp(wanted.of.segments, 0);
     ActiveSet active = wanted.at.active;
     Direction<Model> step(wanted.of.segments, 0);
-    REQUIRE(contacts.solve(wanted.chain, wanted.hessian, active, step));
+    REQUIRE(qp.solve(wanted.problem, wanted.kkt, active, step));
     CHECK(wanted.error(step) <= 1e-8 * wanted.size());
     const std::vector<double> found = wanted.multipliers(active);
     for (int j = 0; j < wanted.count(); ++j) CHECK(std::abs(found[j] - multipliers[j]) <= 1e-7 * kLargest);
@@ -161,17 +161,17 @@ void dependent_gaps() {
     const std::vector<double> multipliers = choose<Model>(random, kWalls, 0.7);
     if (trial % 2) wanted.warm(random);
     wanted.choose(multipliers, random.chance(0.5) ? 0 : 0.2);  // closed without pushing, or open
-    Contacts<Model> contacts(wanted.of.segments, 0);
+    ActiveSetQp<Model> qp(wanted.of.segments, 0);
     ActiveSet active = wanted.at.active;
     Direction<Model> step(wanted.of.segments, 0);
-    REQUIRE(contacts.solve(wanted.chain, wanted.hessian, active, step));
+    REQUIRE(qp.solve(wanted.problem, wanted.kkt, active, step));
     CHECK(wanted.error(step) <= 1e-7 * wanted.size());
     CHECK(active.count <= Model::kSpace + Model::kRod);
     std::vector<double> found = wanted.multipliers(active);
     CHECK(*std::min_element(found.begin(), found.end()) >= 0);
     Direction<Model> pushed(wanted.of.segments, 0);  // by all walls together, more than was wanted
     for (int j = 0; j < wanted.count(); ++j) found[j] -= multipliers[j];
-    wanted.push(found, pushed);
+    wanted.add_responses(found, pushed);
     CHECK(largest(flat<Model>(pushed.controls, pushed.mounts)) <= 1e-6 * wanted.size());
   }
 }
@@ -184,10 +184,10 @@ void no_answer() {
   for (int k = 0; k < Model::kSpace; ++k) wanted.normals[1][k] = -wanted.normals[0][k];
   wanted.gaps[0] = wanted.gaps[1] = -0.1;  // a point on the wrong side of two walls that face each other
   wanted.place();
-  Contacts<Model> contacts(wanted.of.segments, 0);
+  ActiveSetQp<Model> qp(wanted.of.segments, 0);
   ActiveSet active = wanted.at.active;
   Direction<Model> step(wanted.of.segments, 0);
-  CHECK_FALSE(contacts.solve(wanted.chain, wanted.hessian, active, step));
+  CHECK_FALSE(qp.solve(wanted.problem, wanted.kkt, active, step));
 }
 
 // The smallest step, measured by the Hessian, that closes the gaps which are held.
@@ -202,16 +202,16 @@ void restorations() {
     ActiveSet active = wanted.at.active;
     for (int j = 0; j < 2; ++j) active.contact[active.count++] = wanted.contact(j);
     const int held = active.count;
-    Contacts<Model> contacts(wanted.of.segments, 0);
+    ActiveSetQp<Model> qp(wanted.of.segments, 0);
     Direction<Model> step(wanted.of.segments, 0);
-    REQUIRE(contacts.restore(wanted.chain, wanted.hessian, active, step));
+    REQUIRE(qp.restore(wanted.problem, wanted.kkt, active, step));
     // A combination of the responses to the held gaps: as many equations for its parts.
     Dense gram(held, held);
     Column shortfall(static_cast<std::size_t>(held));
     std::vector<typename Wanted<Model>::Slope> slopes;
     for (int j = 0; j < held; ++j) {
-      slopes.push_back(wanted.chain.slope(active.contact[j]));
-      shortfall[j] = -wanted.chain.gaps()[active.contact[j]];
+      slopes.push_back(wanted.problem.slope(active.contact[j]));
+      shortfall[j] = -wanted.problem.gaps()[active.contact[j]];
       CHECK(std::abs(shortfall[j] - slopes[j].along(step)) <= 1e-11);
     }
     for (int c = 0; c < held; ++c) {

@@ -31,10 +31,10 @@ template <int D>
 class Pulled {
  public:
   Pulled(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles)
-      : of_(of), view_(make_robot<D>(of), obstacles.size()), obstacles_(obstacles),
-        follower_(make_follower<D>(make_robot<D>(of), static_cast<int>(obstacles.size()))) {
-    follower_->enter(obstacles_);
-    now_ = to_ = rest_block(*follower_, of.length);
+      : of_(of), obstacles_(obstacles),
+        continuation_(make_continuation<D>(make_robot<D>(of), static_cast<int>(obstacles.size()))) {
+    continuation_->set_obstacles(obstacles_);
+    now_ = to_ = rest_block(*continuation_, of.length);
     rest_ = now_;
   }
 
@@ -47,11 +47,11 @@ class Pulled {
       if (D == 3) command[1] = second * command[0];
       command[D - 1] = of_.length;
       const long before = allocations;
-      const Status status = follower_->follow(now_.data(), command.data(), to_.data());
+      const Status status = continuation_->follow(now_.data(), command.data(), to_.data()).status;
       allocated += allocations - before;
       ++met[static_cast<int>(status)];
       std::swap(now_, to_);
-      touched += now_[view_.force] != 0;
+      touched += now_[continuation_->layout().force.offset] != 0;
     }
   }
 
@@ -67,9 +67,8 @@ class Pulled {
 
  private:
   RobotNumbers of_;
-  View<D> view_;
   std::vector<Obstacle<D>> obstacles_;
-  std::unique_ptr<Follower<D>> follower_;
+  std::unique_ptr<Continuation<D>> continuation_;
   std::vector<double> rest_, now_, to_;
 };
 
@@ -85,32 +84,32 @@ Pulled<D> twice(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacle
   return pulled;
 }
 
-RobotNumbers prototype(bool sliding = false) {
+RobotNumbers prototype(bool rod = false) {
   RobotNumbers of;
-  of.sliding = sliding;
+  of.rod = sliding;
   return of;
 }
 
 int met(const auto& pulled, Status status) { return pulled.met[static_cast<int>(status)]; }
 
 TEST_CASE("a free robot's steps allocate nothing") {
-  for (const bool sliding : {false, true}) CHECK(twice<2>(prototype(sliding), {}, 8).allocated == 0);
+  for (const bool rod : {false, true}) CHECK(twice<2>(prototype(rod), {}, 8).allocated == 0);
   CHECK(twice<3>(prototype(), {}, 6).allocated == 0);
 }
 
 TEST_CASE("steps in contact allocate nothing, stalls included") {
-  for (const double stiffness : {0.0, 0.05}) {
-    for (const bool sliding : {false, true}) {
-      RobotNumbers of = prototype(sliding);
+  for (const double spring : {0.0, 0.05}) {
+    for (const bool rod : {false, true}) {
+      RobotNumbers of = prototype(rod);
       of.max_tension = 5;
       const Robot robot = make_robot<2>(of);
-      const auto pulled = twice<2>(of, {circle(robot, 44, 104, 15, stiffness), circle(robot, 90, 150, 10)}, 14);
+      const auto pulled = twice<2>(of, {circle(robot, 44, 104, 15, spring), circle(robot, 90, 150, 10)}, 14);
       CHECK(pulled.allocated == 0);
       CHECK(pulled.touched > 20);
-      if (stiffness == 0) CHECK(met(pulled, Status::kStalled) > 0);
+      if (spring == 0) CHECK(met(pulled, Status::kStalled) > 0);
     }
     const Robot robot = make_robot<3>(prototype());
-    const auto pulled = twice<3>(prototype(), {sphere(robot, 40, 18, 104, 15, stiffness)}, 8);
+    const auto pulled = twice<3>(prototype(), {sphere(robot, 40, 18, 104, 15, spring)}, 8);
     CHECK(pulled.allocated == 0);
     CHECK(pulled.touched > 20);
   }
@@ -132,10 +131,10 @@ TEST_CASE("steps beside every shape allocate nothing") {
 TEST_CASE("snaps allocate nothing") {
   int snaps = 0;
   long allocated = 0;
-  for (const bool sliding : {false, true})
+  for (const bool rod : {false, true})
     for (double x = 30; x < 60; x += 3) {
-      const Robot robot = make_robot<2>(prototype(sliding));
-      const auto pulled = twice<2>(prototype(sliding), {circle(robot, x, 165, 10)}, 14);
+      const Robot robot = make_robot<2>(prototype(rod));
+      const auto pulled = twice<2>(prototype(rod), {circle(robot, x, 165, 10)}, 14);
       snaps += met(pulled, Status::kSnapped);
       allocated += pulled.allocated;
     }
@@ -153,13 +152,13 @@ TEST_CASE("a batch's steps allocate nothing") {
     batch.scene(i) = {circle(robot, 44 + 0.1 * i, 104, 15)};
     robots.push_back(i);
   }
-  std::vector<double> blocks(kCount * batch.block_size());
+  std::vector<double> blocks(kCount * batch.layout().size);
   const auto step = [&](double cable) {
-    batch.each(robots, [&](Follower<2>& follower, int k) {
-      double* block = blocks.data() + k * batch.block_size();
+    batch.each(robots, [&](Continuation<2>& continuation, int k) {
+      double* block = blocks.data() + k * batch.layout().size;
       const double command[] = {cable, of.length};
-      if (cable == 0) block[1] = of.length;
-      follower.follow(block, command, block);
+      if (cable == 0) block[batch.layout().length.offset] = of.length;
+      continuation.follow(block, command, block);
     });
   };
   // Which thread takes which robot is left to chance, so a thread may first meet one in a later round: the rounds go on

@@ -42,11 +42,12 @@ struct Work {
     }
   };
 
-  void follow(Follower<D>& follower, int robot, int step, Reached& to) const {
-    double* block = to.blocks.data() + static_cast<std::size_t>(robot) * follower.block_size();
+  void follow(Continuation<D>& continuation, int robot, int step, Reached& to) const {
+    double* block = to.blocks.data() + static_cast<std::size_t>(robot) * continuation.layout().size;
     const std::array<double, D> command = wanted[static_cast<std::size_t>(robot * kSteps + step)];
-    to.statuses[static_cast<std::size_t>(robot)] = static_cast<int>(follower.follow(block, command.data(), block));
-    to.iterations[static_cast<std::size_t>(robot)] += follower.iterations;
+    const StepResult result = continuation.follow(block, command.data(), block);
+    to.statuses[static_cast<std::size_t>(robot)] = static_cast<int>(result.status);
+    to.iterations[static_cast<std::size_t>(robot)] += result.iterations;
   }
 
   Reached begin() const {
@@ -60,9 +61,9 @@ struct Work {
   Reached alone() const {
     Reached out = begin();
     for (int i = 0; i < static_cast<int>(settings.size()); ++i) {
-      const auto follower = make_follower<D>(robot, kObstacles);
-      follower->enter(settings[static_cast<std::size_t>(i)].obstacles);
-      for (int step = 0; step < kSteps; ++step) follow(*follower, i, step, out);
+      const auto continuation = make_continuation<D>(robot, kObstacles);
+      continuation->set_obstacles(settings[static_cast<std::size_t>(i)].obstacles);
+      for (int step = 0; step < kSteps; ++step) follow(*continuation, i, step, out);
     }
     return out;
   }
@@ -77,7 +78,7 @@ struct Work {
       for (int first = 0; first < count; first += at_a_time) {
         std::vector<int> robots;
         for (int k = first; k < std::min(first + at_a_time, count); ++k) robots.push_back(backwards ? count - 1 - k : k);
-        batch.each(robots, [&](Follower<D>& follower, int k) { follow(follower, robots[static_cast<std::size_t>(k)], step, out); });
+        batch.each(robots, [&](Continuation<D>& continuation, int k) { follow(continuation, robots[static_cast<std::size_t>(k)], step, out); });
       }
     return out;
   }
@@ -89,16 +90,16 @@ struct Work {
 };
 
 template <int D>
-void compare(bool sliding) {
+void compare(bool rod) {
   Random random(1);
   RobotNumbers of;
-  of.sliding = sliding;
+  of.rod = rod;
   const Work<D> work(random, of, 20);
   const auto alone = work.alone();
   int touching = 0;
-  const View<D> view(work.robot, work.kObstacles);
+  const std::size_t force = make_continuation<D>(work.robot, work.kObstacles)->layout().force.offset;
   for (std::size_t i = 0; i < work.settings.size(); ++i)
-    touching += alone.blocks[i * work.settings[0].rest.size() + view.force] != 0;
+    touching += alone.blocks[i * work.settings[0].rest.size() + force] != 0;
   CHECK(touching > 3);
   for (const int threads : {1, 2, 4})
     for (const int at_a_time : {7, 20}) {
@@ -119,7 +120,7 @@ TEST_CASE("every robot of a call is worked on once") {
   Batch<2> batch(make_robot<2>({}), 100, 0, 4);
   std::vector<int> robots(100), visits(100);
   for (int i = 0; i < 100; ++i) robots[i] = i;
-  for (int call = 0; call < 300; ++call) batch.each(robots, [&](Follower<2>&, int k) { ++visits[k]; });
+  for (int call = 0; call < 300; ++call) batch.each(robots, [&](Continuation<2>&, int k) { ++visits[k]; });
   for (const int count : visits) CHECK(count == 300);
 }
 

@@ -1,4 +1,4 @@
-// A chain among obstacles, fixed and on springs: its slopes and its Hessian against differences, dense.
+// A problem among obstacles, fixed and on springs: its slopes and its Hessian against differences, dense.
 #include "problems.hpp"
 
 namespace ccr::testing {
@@ -12,12 +12,12 @@ struct Touched {
 
   // A round obstacle on each of a few points, the first two of them on springs, the last beside the middle of an edge.
   explicit Touched(Random& random)
-      : of(numbers(random)), robot(make_robot<kSpace>(of)), chain(robot, kObstacles),
+      : of(numbers(random)), robot(make_robot<kSpace>(of)), problem(robot, kObstacles),
         at(random_shape<Model>(random, of, kSprings, 0.05)) {
-    REQUIRE(chain.evaluate({at.command, at.controls, {}, {}}));
+    REQUIRE(problem.evaluate({at.command, at.controls, {}, {}}));
     for (int j = 0; j < kObstacles; ++j) {
       point[j] = random.integer(0, 1) * robot.positions() + random.integer(4, robot.positions() - 1);
-      Position<kSpace> center = chain.points()[point[j]];
+      Position<kSpace> center = problem.points()[point[j]];
       const Vec<kSpace> way = random.template direction<kSpace>();
       const bool mounted = j < kSprings;
       for (int k = 0; k < kSpace; ++k) center[k] += 6 * way[k] - (mounted ? at.mounts[j][k] : 0);
@@ -26,13 +26,13 @@ struct Touched {
       at.active.multiplier[j] = random.decades(-7, -3);
     }
     at.active.count = kObstacles;
-    chain.enter(obstacles);
-    look_around(chain, at);
+    problem.set_obstacles(obstacles);
+    update_broadphase(problem, at);
     if constexpr (Model::kRod) {
-      at.active.contact[kObstacles] = chain.contacts();
+      at.active.contact[kObstacles] = problem.contacts();
       at.active.multiplier[at.active.count++] = 0.02;
     }
-    REQUIRE(chain.evaluate(at));
+    REQUIRE(problem.evaluate(at));
   }
 
   static RobotNumbers numbers(Random& random) {
@@ -41,18 +41,18 @@ struct Touched {
     return of;
   }
 
-  Obstacle<kSpace> make_ball(const Position<kSpace>& center, double r, double stiffness) const {
+  Obstacle<kSpace> make_ball(const Position<kSpace>& center, double r, double spring) const {
     if constexpr (kSpace == 2)
-      return circle(robot, center[0], center[1], r, stiffness);
+      return circle(robot, center[0], center[1], r, spring);
     else
-      return sphere(robot, center[0], center[1], center[2], r, stiffness);
+      return sphere(robot, center[0], center[1], center[2], r, spring);
   }
 
   // Energy and springs less what the contacts hold.
   double lagrangian(const Iterate<Model>& there) {
-    REQUIRE(chain.evaluate(there));
-    double value = chain.energy();
-    for (int j = 0; j < at.active.count; ++j) value -= at.active.multiplier[j] * chain.gaps()[at.active.contact[j]];
+    REQUIRE(problem.evaluate(there));
+    double value = problem.energy();
+    for (int j = 0; j < at.active.count; ++j) value -= at.active.multiplier[j] * problem.gaps()[at.active.contact[j]];
     return value;
   }
 
@@ -77,7 +77,7 @@ struct Touched {
   RobotNumbers of;
   Robot robot;
   std::vector<Obstacle<kSpace>> obstacles;
-  Chain<Model> chain;
+  ContactProblem<Model> problem;
   Iterate<Model> at;
   std::array<int, kObstacles> point;
 };
@@ -87,7 +87,7 @@ void slopes() {
   Random random(1);
   for (int trial = 0; trial < 10; ++trial) {
     Touched<Model> touched(random);
-    const Column slope = lagrangian_slope(touched.chain, touched.at);
+    const Column slope = lagrangian_slope(touched.problem, touched.at);
     const Dense found = touched.differences(1, [&](const auto& there) { return Column{touched.lagrangian(there)}; });
     for (std::size_t k = 0; k < slope.size(); ++k) CHECK(std::abs(slope[k] - found(0, static_cast<int>(k))) <= 1e-7);
   }
@@ -95,27 +95,27 @@ void slopes() {
 
 // Of a step, what the Hessian by differences makes of it must be what was asked for.
 template <class Model>
-void hessian() {
+void kkt_systems() {
   Random random(2);
   int definite = 0;
   for (int trial = 0; trial < 30; ++trial) {
     Touched<Model> touched(random);
-    Chain<Model>& chain = touched.chain;
+    ContactProblem<Model>& problem = touched.problem;
     const int n = static_cast<int>(unknowns(touched.at));
-    Dense expected = touched.differences(n, [&](const auto& there) { return lagrangian_slope(chain, there); });
-    const Column slope = lagrangian_slope(chain, touched.at);
+    Dense expected = touched.differences(n, [&](const auto& there) { return lagrangian_slope(problem, there); });
+    const Column slope = lagrangian_slope(problem, touched.at);
     std::vector<Column> gap_slopes;
     const Dense gaps = touched.differences(touched.at.active.count, [&](const auto& there) {
-      REQUIRE(chain.evaluate(there));
+      REQUIRE(problem.evaluate(there));
       Column out;
-      for (int j = 0; j < touched.at.active.count; ++j) out.push_back(chain.gaps()[touched.at.active.contact[j]]);
+      for (int j = 0; j < touched.at.active.count; ++j) out.push_back(problem.gaps()[touched.at.active.contact[j]]);
       return out;
     });
-    lagrangian_slope(chain, touched.at);
+    lagrangian_slope(problem, touched.at);
 
-    Hessian<Model> system(touched.robot.segments, touched.kSprings);
+    KktSystem<Model> system(touched.robot.segments, touched.kSprings);
     const double strength = trial % 2 ? 0 : 10;
-    system.shape(chain, touched.at.active, strength);
+    system.assemble(problem, touched.at.active, strength);
     for (int j = 0; j < touched.at.active.count; ++j)
       for (int r = 0; r < n; ++r)
         for (int c = 0; c < n; ++c) expected(r, c) += system.penalty(j) * gaps(j, r) * gaps(j, c);
@@ -128,13 +128,13 @@ void hessian() {
     if (pivot < 0) continue;
     ++definite;
 
-    using Slope = typename Chain<Model>::Slope;
+    using Slope = typename ContactProblem<Model>::Slope;
     std::vector<Slope> loads;
     std::vector<Direction<Model>> responses(touched.at.active.count + 1, Direction<Model>(touched.robot.segments, touched.kSprings));
-    for (int j = 0; j < touched.at.active.count; ++j) loads.push_back(chain.slope(touched.at.active.contact[j]));
-    std::vector<typename Hessian<Model>::Load> asked = {{nullptr, &responses.back()}};
+    for (int j = 0; j < touched.at.active.count; ++j) loads.push_back(problem.slope(touched.at.active.contact[j]));
+    std::vector<typename KktSystem<Model>::Load> asked = {{nullptr, &responses.back()}};
     for (int j = 0; j < touched.at.active.count; ++j) asked.push_back({&loads[j], &responses[j]});
-    system.respond(chain, asked);
+    system.solve(problem, asked);
     const auto compare = [&](const Direction<Model>& response, const Column& right) {
       const Column made = product(expected, flat<Model>(response.controls, response.mounts));
       CHECK(apart(made, right) <= 1e-5 * (largest(right) + largest(flat<Model>(response.controls, response.mounts))));
@@ -165,7 +165,7 @@ TEST_CASE_TEMPLATE("the slope of the Lagrangian is that of its value", Model, Pl
 
 TEST_CASE_TEMPLATE("the Hessian is that of the Lagrangian, springs and penalties included", Model, Planar<PaperLaw>,
                    Planar<RodLaw>, Spatial) {
-  hessian<Model>();
+  kkt_systems<Model>();
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ TEST_CASE("the slopes of a uniform cable's segment are those of its shape") {
         CHECK(near(at.heading_slope, (heading(more) - heading(less)) / (2 * h), 1));
         CHECK(near(at.heading_curvature, (more.heading_slope - less.heading_slope) / (2 * h), 10));
         const auto pulled = uniform(sine, pull + h, scale), eased = uniform(sine, pull - h, scale);
-        CHECK(near(at.pull_slope * scale, (pulled.angle - eased.angle) / (2 * h), 1));
+        CHECK(near(at.displacement_slope * scale, (pulled.angle - eased.angle) / (2 * h), 1));
       }
 }
 
@@ -118,8 +118,8 @@ struct InSpace {
   double objective;
   Vec<3> objective_slope;
   Mat<3, 3> chord_slope, turn_slope;
-  Vec<2> objective_pull_slope;
-  Mat<3, 2> chord_pull_slope, turn_pull_slope;
+  Vec<2> objective_displacement_slope;
+  Mat<3, 2> chord_displacement_slope, turn_displacement_slope;
 };
 static_assert(sizeof(InSpace) == SpatialLaw::kBend * sizeof(double));
 
@@ -235,7 +235,7 @@ TEST_CASE("the slopes of a segment in space are those of its shape") {
       up[k] += h;
       down[k] -= h;
       compare(in_space(c.control, segment_inputs(up, c.angle, c.scale)), in_space(c.control, segment_inputs(down, c.angle, c.scale)),
-              2 * h * c.scale, at.objective_pull_slope[k], column(at.chord_pull_slope, k), column(at.turn_pull_slope, k), c.scale);
+              2 * h * c.scale, at.objective_displacement_slope[k], column(at.chord_displacement_slope, k), column(at.turn_displacement_slope, k), c.scale);
     }
   }
 }
@@ -296,7 +296,7 @@ TEST_CASE("wide registers change no bit" * doctest::skip(!__builtin_cpu_supports
 
     const SegmentInputs inputs = segment_inputs({{random.uniform(0, 0.6), random.uniform(0, 0.6)}}, 1.3, 1);
     Space narrow(n), broad(n);
-    Rows adjoints(SpatialLaw::kAdjoint, n), hessian_contraction(SpatialLaw::kHessian, n), hessians(SpatialLaw::kHessian, n);
+    Rows adjoints(SpatialLaw::kAdjoint, n), narrow_hessians(SpatialLaw::kHessian, n), broad_hessians(SpatialLaw::kHessian, n);
     for (int i = 0; i < n; ++i) {
       narrow.controls.put(i, random.matrix<3>(0.15).v.data(), 3);
       adjoints.put(i, random.matrix<6>().v.data(), 6);
@@ -306,9 +306,9 @@ TEST_CASE("wide registers change no bit" * doctest::skip(!__builtin_cpu_supports
     CHECK(avx2::bend(n, inputs, broad.controls, broad.bendings, broad.bends));
     CHECK(same_bits(narrow.bendings, broad.bendings, SpatialLaw::kBending, n));
     CHECK(same_bits(narrow.bends, broad.bends, SpatialLaw::kBend, n));
-    baseline::hessian_contraction(n, inputs, narrow.controls, narrow.bendings, adjoints, bow);
-    avx2::hessian_contraction(n, inputs, broad.controls, broad.bendings, adjoints, hessians);
-    CHECK(same_bits(bow, hessians, SpatialLaw::kHessian, n));
+    baseline::hessian_contraction(n, inputs, narrow.controls, narrow.bendings, adjoints, narrow_hessians);
+    avx2::hessian_contraction(n, inputs, broad.controls, broad.bendings, adjoints, broad_hessians);
+    CHECK(same_bits(narrow_hessians, broad_hessians, SpatialLaw::kHessian, n));
   }
 }
 

@@ -35,7 +35,7 @@ double sagitta(const Obstacle<D>& obstacle) {
   const std::size_t count = obstacle.outline.size();
   for (std::size_t k = 0; k < count; ++k)
     longest = std::max(longest, norm(minus(obstacle.outline[(k + 1) % count], obstacle.outline[k])));
-  return 1.01 * longest * longest / (8 * obstacle.fineness);
+  return 1.01 * longest * longest / (8 * obstacle.min_curvature_radius);
 }
 
 template <int D>

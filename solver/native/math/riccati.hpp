@@ -1,4 +1,4 @@
-// Newton systems of a chain: minimise ½ Σ (x,u)ᵀ H_i (x,u) + linear terms subject to x⁺ = A x + B u, x_0 = 0.
+// Newton systems of a problem: minimise ½ Σ (x,u)ᵀ H_i (x,u) + linear terms subject to x⁺ = A x + B u, x_0 = 0.
 #pragma once
 
 #include <cstddef>

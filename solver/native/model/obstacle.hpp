@@ -29,13 +29,13 @@ struct Obstacle {
   Law law;                               // of a custom shape
   Position<D> center;                    // of a ball that holds it
   double radius;                         // of that ball; infinite for a wall
-  double fineness;                       // smallest radius of its surface; infinite for a wall
+  double min_curvature_radius;                       // smallest radius of its surface; infinite for a wall
   double inradius;                       // of the largest ball inside it; infinite for a wall
   std::vector<Position<D>> outline;      // points of its surface, where its gap is no distance; else none
   std::vector<unsigned char> touchable;  // (lines, positions): whether a point can touch it
   bool everywhere;                       // whether all of them can
   bool mounted;                          // on a spring; fixed otherwise
-  Mat<D, D> stiffness;                   // of its spring [N/mm]
+  Mat<D, D> spring;                      // of its spring [N/mm]
 
   bool wall() const { return shape == Shape::kHalfPlane || shape == Shape::kHalfSpace; }
 };

@@ -34,16 +34,16 @@ Planar<Cable>::Planar(const Robot& robot)
       gradient(robot.segments),
       robot_(robot),
       bends_(robot.segments),
-      one_(1),
+      free_bend_(1),
       adjoints_(robot.segments) {}
 
 template <class Cable>
 bool Planar<Cable>::evaluate(const Command<1>& command, const std::vector<Control>& controls) {
   const int n = robot_.segments;
-  pull_ = command.cables[0] / n;
+  displacement_ = command.cables[0] / n;
   length_ = command.length / n;
-  objective = steepest = widest = 0;
-  Cable::bend(n, controls[0].v.data(), pull_, length_, robot_.offset, bends_);
+  objective = max_objective_slope = widest = 0;
+  Cable::bend(n, controls[0].v.data(), displacement_, length_, robot_.offset, bends_);
   states[0] = {};
   frames[0] = {{1, 0}};
   for (int i = 0; i < n; ++i) {
@@ -60,18 +60,18 @@ bool Planar<Cable>::evaluate(const Command<1>& command, const std::vector<Contro
     next[2] -= bend.angle;
     if constexpr (kRod) next[3] += bend.taken;
     objective += bend.angle * bend.angle;
-    steepest = std::max(steepest, std::abs(2 * bend.angle * bend.slope));
+    max_objective_slope = std::max(max_objective_slope, std::abs(2 * bend.angle * bend.slope));
     widest = std::max(widest, std::abs(bend.angle));
   }
   return std::isfinite(objective) && !(kRod && widest > tolerances::kWidestTurn);
 }
 
 template <class Cable>
-void Planar<Cable>::adjoin(const std::vector<State>& pulls) {
+void Planar<Cable>::adjoin(const std::vector<State>& node_forces) {
   State p;
   for (int i = robot_.segments - 1; i >= 0; --i) {
     const auto bend = bends_[i];
-    p -= pulls[i + 1];
+    p -= node_forces[i + 1];
     adjoints_[i] = p;
     const double turn = turning(p, bend);
     gradient[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
@@ -109,13 +109,13 @@ void Planar<Cable>::curvature(System& system) const {
 
 // With a sliding cable that is the multiplier of its slack.
 template <class Cable>
-Vec<1> Planar<Cable>::pull_slopes() const {
+Vec<1> Planar<Cable>::displacement_slopes() const {
   Vec<1> slope;
   if constexpr (!kRod)
     for (int i = 0; i < robot_.segments; ++i) {
       const auto bend = bends_[i];
       const State& p = adjoints_[i];
-      slope[0] += bend.pull_slope * (2 * bend.angle - turning(p, bend) / 2 - p[2]);
+      slope[0] += bend.displacement_slope * (2 * bend.angle - turning(p, bend) / 2 - p[2]);
     }
   slope[0] /= robot_.segments;
   return slope;
@@ -133,23 +133,23 @@ DiskGap Planar<Cable>::disk_gap(int segment, int side) const requires(kRod) {
 }
 
 template <class Cable>
-Planar<Cable>::Control Planar<Cable>::relaxed(const Command<1>& command) {
-  if (command == relaxed_at_) return relaxed_;
-  const double pull = command.cables[0] / robot_.segments, length = command.length / robot_.segments;
-  relaxed_at_ = command;
-  relaxed_ = {};
-  if constexpr (kRod) relaxed_[0] = pull / robot_.offset;
+Planar<Cable>::Control Planar<Cable>::free_control(const Command<1>& command) {
+  if (command == free_command_) return free_control_;
+  const double displacement = command.cables[0] / robot_.segments, length = command.length / robot_.segments;
+  free_command_ = command;
+  free_control_ = {};
+  if constexpr (kRod) free_control_[0] = displacement / robot_.offset;
   for (int i = 0; i <= tolerances::kRelaxIterations; ++i) {
-    Cable::bend(1, relaxed_.v.data(), pull, length, robot_.offset, one_);
+    Cable::bend(1, free_control_.v.data(), displacement, length, robot_.offset, free_bend_);
     if constexpr (!kRod) {
       break;
     } else {
-      const double change = (one_[0].taken - pull) / one_[0].taken_slope;
-      relaxed_[0] -= change;
-      if (std::abs(change) <= tolerances::kRelaxed * std::abs(relaxed_[0])) break;
+      const double change = (free_bend_[0].taken - displacement) / free_bend_[0].taken_slope;
+      free_control_[0] -= change;
+      if (std::abs(change) <= tolerances::kRelaxed * std::abs(free_control_[0])) break;
     }
   }
-  return relaxed_;
+  return free_control_;
 }
 
 // All segments have the same shape: the sums over their directions (i + 1/2) θ are taken by turning one of them on.
@@ -157,14 +157,14 @@ template <class Cable>
 Vec<3> Planar<Cable>::free_slopes(const Command<1>& command) {
   const int n = robot_.segments;
   const double length = command.length / n;
-  relaxed(command);
-  const auto bend = one_[0];
+  free_control(command);
+  const auto bend = free_bend_[0];
   double turn, stretch = 0;  // slopes of the angle and of the logarithm of the chord
   if constexpr (kRod) {
     turn = 1 / (n * bend.taken_slope);
     stretch = bend.stretch * turn;
   } else {
-    turn = bend.pull_slope / n;
+    turn = bend.displacement_slope / n;
   }
   const double chord = length * std::sqrt(bend.forward * bend.forward + bend.sideways * bend.sideways);
   double cosine = std::cos(bend.angle / 2), sine = std::sin(bend.angle / 2);

@@ -57,37 +57,37 @@ class Planar {
   // Shape under a command; false when a coordinate leaves the range of the segment law.
   bool evaluate(const Command<1>& command, const std::vector<Control>& controls);
 
-  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the pulls on each node.
-  void adjoin(const std::vector<State>& pulls);
+  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each node.
+  void adjoin(const std::vector<State>& node_forces);
   // Both follow adjoin.
   void curvature(System& system) const;
-  Vec<1> pull_slopes() const;  // of the Lagrangian in the cable displacement
+  Vec<1> displacement_slopes() const;  // of the Lagrangian in the cable displacement
 
   // The control of every segment of the robot that nothing touches, and with a sliding cable the multiplier of its slack.
-  Control relaxed(const Command<1>& command);
-  double relaxed_push() const requires(kRod) { return 2 * relaxed_[0] / one_[0].taken_slope; }
+  Control free_control(const Command<1>& command);
+  double free_slack_multiplier() const requires(kRod) { return 2 * free_control_[0] / free_bend_[0].taken_slope; }
   Vec<kTip> free_slopes(const Command<1>& command);
 
   double slack(const Command<1>& command) const requires(kRod) { return states.back()[kState - 1] - command.cables[0]; }
   DiskGap disk_gap(int segment, int side) const requires(kRod);  // 1 for the cable's side, -1 for the other
-  double widest_shear() const { return kRod ? HUGE_VAL : 1 - pull_ / length_; }  // sine of it
-  double free_turn() const { return pull_ / robot_.offset; }  // of a segment that nothing touches, about
+  double widest_shear() const { return kRod ? HUGE_VAL : 1 - displacement_ / length_; }  // sine of it
+  double free_turn() const { return displacement_ / robot_.offset; }  // of a segment that nothing touches, about
   double segment_length() const { return length_; }
 
   std::vector<State> states;
   std::vector<Frame> frames;
   std::vector<Control> gradient;
   double objective = 0;
-  double steepest = 0;  // largest slope of the objective alone
+  double max_objective_slope = 0;  // largest slope of the objective alone
   double widest = 0;    // largest angle between consecutive disks
 
  private:
   Robot robot_;
-  double pull_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
+  double displacement_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
   typename Cable::Bends bends_;
-  typename Cable::Bends one_;  // a segment that nothing touches, relaxed under the last command asked about
-  Command<1> relaxed_at_{{{-1}}, 0};
-  Control relaxed_{};
+  typename Cable::Bends free_bend_;  // a segment that nothing touches, relaxed under the last command asked about
+  Command<1> free_command_{{{-1}}, 0};
+  Control free_control_{};
   std::vector<State> adjoints_;  // of the state each segment leads to
 };
 

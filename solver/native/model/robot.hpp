@@ -7,8 +7,11 @@
 
 namespace ccr {
 
+// In the plane the model of the paper or the discrete rod, in space that of the paper (eq. 13).
+enum class ModelKind { kPaper, kRod, kSpatial };
+
 struct Robot {
-  bool sliding;
+  ModelKind model;
   int segments;
   double offset;       // cables from backbone [mm]
   double angle;        // from the first cable to the second [rad]
@@ -22,7 +25,7 @@ struct Robot {
 
   int positions() const { return segments * (between + 1) + 1; }  // of a line
   int points() const { return static_cast<int>(lines.size()) * positions(); }
-  double stiffness(double length) const { return rigidity * segments / (2 * length); }  // EI / 2 l0 [N mm]
+  double energy_scale(double length) const { return rigidity * segments / (2 * length); }  // EI / 2 l0 [N mm]
 };
 
 // Of the disks of a segment on one side, in the angle between them [mm, mm per rad].

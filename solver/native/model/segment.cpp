@@ -5,7 +5,7 @@ namespace ccr {
 
 #ifdef CCR_AVX2
 namespace avx2 {
-void bend(int n, const double* sines, double pull, double length, double offset, PaperLaw::Bends& bends);
+void bend(int n, const double* sines, double displacement, double length, double offset, PaperLaw::Bends& bends);
 void bend(int n, const double* angles, double length, double offset, RodLaw::Bends& bends);
 bool bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends);
 void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings, const Rows& adjoints, Rows& hessians);
@@ -16,11 +16,11 @@ const bool has_avx2 = __builtin_cpu_supports("avx2");
 }
 #endif
 
-void PaperLaw::bend(int n, const double* sines, double pull, double length, double offset, Bends& bends) {
+void PaperLaw::bend(int n, const double* sines, double displacement, double length, double offset, Bends& bends) {
 #ifdef CCR_AVX2
-  if (has_avx2) return avx2::bend(n, sines, pull, length, offset, bends);
+  if (has_avx2) return avx2::bend(n, sines, displacement, length, offset, bends);
 #endif
-  baseline::bend(n, sines, pull, length, offset, bends);
+  baseline::bend(n, sines, displacement, length, offset, bends);
 }
 
 void RodLaw::bend(int n, const double* angles, double, double length, double offset, Bends& bends) {

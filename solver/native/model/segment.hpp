@@ -53,7 +53,7 @@ struct PaperLaw {
   static constexpr bool kRod = false;
 
   struct Bend {
-    double angle, slope, curvature, pull_slope;   // θ, θ_σ, θ_σσ, θ_pull
+    double angle, slope, curvature, displacement_slope;   // θ, θ_σ, θ_σσ, θ_pull
     double forward, sideways;                     // backbone segment from the lower disk's y axis, over its length
     double heading_slope, heading_curvature;      // of its direction
     double cosine, sine;                          // of θ
@@ -63,7 +63,7 @@ struct PaperLaw {
   using Bends = Table<Bend>;
 
   // Fills all but dx and dy of n segments; NaN where the law has no value.
-  static void bend(int n, const double* sines, double pull, double length, double offset, Bends& bends);
+  static void bend(int n, const double* sines, double displacement, double length, double offset, Bends& bends);
 };
 
 // The cable slides through all disks (Rao 2024). A segment is an arc, its coordinate the angle θ between its disks; what
@@ -84,7 +84,7 @@ struct RodLaw {
 
   using Bends = Table<Bend>;
 
-  static void bend(int n, const double* angles, double pull, double length, double offset, Bends& bends);
+  static void bend(int n, const double* angles, double displacement, double length, double offset, Bends& bends);
 };
 
 // Inputs of the law of a segment in space, the same for all segments.

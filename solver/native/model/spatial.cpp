@@ -35,7 +35,7 @@ bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& co
   const int n = robot_.segments;
   for (int i = 0; i < n; ++i) controls_.put(i, controls[i].v.data(), kControl);
   if (!SpatialLaw::bend(n, inputs_, controls_, bendings_, laws_)) return false;
-  objective = steepest = 0;
+  objective = max_objective_slope = 0;
   states[0] = {};
   frames[0] = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
   for (int i = 0; i < n; ++i) {
@@ -46,18 +46,18 @@ bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& co
     for (int k = 0; k < 3; ++k) states[i + 1][k] += chord[k];
     frames[i + 1] = times(frames[i], bend.rotation);
     objective += bend.objective;
-    for (const double slope : bend.objective_slope.v) steepest = std::max(steepest, std::abs(slope));
+    for (const double slope : bend.objective_slope.v) max_objective_slope = std::max(max_objective_slope, std::abs(slope));
   }
   return std::isfinite(objective);
 }
 
-void Spatial::adjoin(const std::vector<State>& pulls) {
+void Spatial::adjoin(const std::vector<State>& node_forces) {
   Vec<3> force, moment;
   for (int i = robot_.segments - 1; i >= 0; --i) {
     const Bend& bend = bends_[i];
     for (int k = 0; k < 3; ++k) {
-      force[k] -= pulls[i + 1][k];
-      moment[k] -= pulls[i + 1][3 + k];
+      force[k] -= node_forces[i + 1][k];
+      moment[k] -= node_forces[i + 1][3 + k];
     }
     forces_[i] = transpose_times(frames[i], force);
     moments_[i] = transpose_times(frames[i], moment);
@@ -98,13 +98,13 @@ void Spatial::curvature(System& system) const {
   system.node_hessian[robot_.segments] = {};
 }
 
-Vec<2> Spatial::pull_slopes() const {
+Vec<2> Spatial::displacement_slopes() const {
   Vec<2> slopes;
   for (int i = 0; i < robot_.segments; ++i) {
     const Bend& bend = bends_[i];
-    slopes += bend.objective_pull_slope;
-    slopes += transpose_times(bend.chord_pull_slope, forces_[i]);
-    slopes += transpose_times(bend.turn_pull_slope, moments_[i]);
+    slopes += bend.objective_displacement_slope;
+    slopes += transpose_times(bend.chord_displacement_slope, forces_[i]);
+    slopes += transpose_times(bend.turn_displacement_slope, moments_[i]);
   }
   for (double& slope : slopes.v) slope /= robot_.segments;
   return slopes;

@@ -65,11 +65,11 @@ class Spatial {
   // Shape under a command; false where the cables cannot have their lengths.
   bool evaluate(const Command<2>& command, const std::vector<Control>& controls);
 
-  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the pulls on each node.
-  void adjoin(const std::vector<State>& pulls);
+  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each node.
+  void adjoin(const std::vector<State>& node_forces);
   // Both follow adjoin.
   void curvature(System& system) const;
-  Vec<2> pull_slopes() const;  // of the Lagrangian in the size of the cable displacements
+  Vec<2> displacement_slopes() const;  // of the Lagrangian in the size of the cable displacements
 
   Vec<kTip> free_slopes(const Command<2>& command) const;
 
@@ -81,7 +81,7 @@ class Spatial {
   std::vector<Frame> frames;
   std::vector<Control> gradient;
   double objective = 0;
-  double steepest = 0;  // largest slope of the objective alone
+  double max_objective_slope = 0;  // largest slope of the objective alone
 
  private:
   // What the law of a segment gives, in the frame of its lower disk.
@@ -91,8 +91,8 @@ class Spatial {
     double objective;
     Vec<3> objective_slope;
     Mat<3, 3> chord_slope, turn_slope;
-    Vec<2> objective_pull_slope;
-    Mat<3, 2> chord_pull_slope, turn_pull_slope;
+    Vec<2> objective_displacement_slope;
+    Mat<3, 2> chord_displacement_slope, turn_displacement_slope;
   };
 
   static_assert(sizeof(Bend) == SpatialLaw::kBend * sizeof(double));

@@ -12,26 +12,26 @@ namespace ccr {
 using namespace tolerances;
 
 template <class Model>
-Contacts<Model>::Contacts(int segments, int mounts)
+ActiveSetQp<Model>::ActiveSetQp(int segments, int mounts)
     : slopes_(kMaxActive), penalties_(kMaxActive), responses_(kMaxActive, Direction(segments, mounts)), loads_(kMaxActive + 1) {}
 
 template <class Model>
-Contacts<Model>::Load Contacts<Model>::load(const Chain& chain, int contact, int j, double penalty) {
-  slopes_[j] = chain.slope(contact);
+ActiveSetQp<Model>::Load ActiveSetQp<Model>::linearize_gap(const ContactProblem& problem, int contact, int j, double penalty) {
+  slopes_[j] = problem.slope(contact);
   penalties_[j] = penalty;
   return {&slopes_[j], &responses_[j]};
 }
 
 // What the penalty on the active gaps adds to a step while they are not closed.
 template <class Model>
-void Contacts<Model>::penalize(const Chain& chain, const ActiveSet& active, Direction& step) const {
+void ActiveSetQp<Model>::add_penalty_response(const ContactProblem& problem, const ActiveSet& active, Direction& step) const {
   for (int j = 0; j < active.count; ++j)
-    if (penalties_[j] != 0) step.add(-penalties_[j] * chain.gaps()[active.contact[j]], responses_[j]);
+    if (penalties_[j] != 0) step.add(-penalties_[j] * problem.gaps()[active.contact[j]], responses_[j]);
 }
 
 // Takes a contact out, with its slope and response; `responses` counts those in use.
 template <class Model>
-void Contacts<Model>::release(ActiveSet& active, int j, int responses) {
+void ActiveSetQp<Model>::remove_contact(ActiveSet& active, int j, int responses) {
   std::rotate(slopes_.begin() + j, slopes_.begin() + j + 1, slopes_.begin() + responses);
   std::rotate(penalties_.begin() + j, penalties_.begin() + j + 1, penalties_.begin() + responses);
   std::rotate(responses_.begin() + j, responses_.begin() + j + 1, responses_.begin() + responses);
@@ -40,7 +40,7 @@ void Contacts<Model>::release(ActiveSet& active, int j, int responses) {
 
 // Cholesky factor of ∇cᵀH⁻¹∇c over the active gaps; false where they depend on each other.
 template <class Model>
-bool Contacts<Model>::factor(const ActiveSet& active) {
+bool ActiveSetQp<Model>::factor_gram(const ActiveSet& active) {
   for (int j = 0; j < active.count; ++j)
     for (int i = j; i < active.count; ++i) {
       const double entry = along(i, responses_[j]);
@@ -53,7 +53,7 @@ bool Contacts<Model>::factor(const ActiveSet& active) {
 }
 
 template <class Model>
-void Contacts<Model>::apply_inverse(int count, Column& x) const {
+void ActiveSetQp<Model>::solve_gram(int count, Column& x) const {
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < i; ++k) x[i] -= gram_[i][k] * x[k];
     x[i] /= gram_[i][i];
@@ -66,16 +66,16 @@ void Contacts<Model>::apply_inverse(int count, Column& x) const {
 
 // Change of the multipliers that closes the active gaps.
 template <class Model>
-Contacts<Model>::Column Contacts<Model>::closing(const Chain& chain, const ActiveSet& active, const Direction& step) const {
+ActiveSetQp<Model>::Column ActiveSetQp<Model>::closing_multipliers(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const {
   Column change;
   for (int j = 0; j < active.count; ++j)
-    change[j] = -chain.gaps()[active.contact[j]] - along(j, step);
-  apply_inverse(active.count, change);
+    change[j] = -problem.gaps()[active.contact[j]] - along(j, step);
+  solve_gram(active.count, change);
   return change;
 }
 
 template <class Model>
-void Contacts<Model>::push(const Column& change, ActiveSet& active, Direction& step) const {
+void ActiveSetQp<Model>::apply(const Column& change, ActiveSet& active, Direction& step) const {
   for (int j = 0; j < active.count; ++j) {
     active.multiplier[j] += change[j];
     step.add(change[j], responses_[j]);
@@ -84,42 +84,42 @@ void Contacts<Model>::push(const Column& change, ActiveSet& active, Direction& s
 
 // Closes the active gaps, releasing those whose multiplier would turn negative.
 template <class Model>
-void Contacts<Model>::settle(const Chain& chain, ActiveSet& active, Direction& step) {
+void ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step) {
   while (active.count > 0) {
     int lowest;
     const auto begin = active.multiplier.begin(), end = begin + active.count;
-    if (factor(active)) {
-      const Column change = closing(chain, active, step);
+    if (factor_gram(active)) {
+      const Column change = closing_multipliers(problem, active, step);
       lowest = 0;
       for (int j = 1; j < active.count; ++j)
         if (begin[j] + change[j] < begin[lowest] + change[lowest]) lowest = j;
       if (begin[lowest] + change[lowest] >= 0) {
-        push(change, active, step);
+        apply(change, active, step);
         return;
       }
     } else {
       lowest = static_cast<int>(std::min_element(begin, end) - begin);
     }
     step.add(-begin[lowest], responses_[lowest]);
-    release(active, lowest, active.count);
+    remove_contact(active, lowest, active.count);
   }
 }
 
 // Adds a violated gap by dual steps: its multiplier grows until it is closed, releasing whatever turns negative.
 template <class Model>
-bool Contacts<Model>::admit(const Chain& chain, Hessian& hessian, int contact, ActiveSet& active, Direction& step) {
+bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active, Direction& step) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   if (active.count == kMaxActive) return false;
-  const Load newcomer = load(chain, contact, active.count, 0);
-  hessian.respond(chain, {&newcomer, 1});
+  const Load newcomer = linearize_gap(problem, contact, active.count, 0);
+  kkt.solve(problem, {&newcomer, 1});
   double multiplier = 0;
   for (;;) {
     const int count = active.count;
     const Direction& response = responses_[count];
-    if (!factor(active)) return false;
+    if (!factor_gram(active)) return false;
     Column coupling, trade;
     for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(j, response);
-    apply_inverse(count, trade);
+    solve_gram(count, trade);
     const double full = along(count, response);
     double curvature = full;
     for (int j = 0; j < count; ++j) curvature -= coupling[j] * trade[j];
@@ -131,7 +131,7 @@ bool Contacts<Model>::admit(const Chain& chain, Hessian& hessian, int contact, A
         to_release = active.multiplier[j] / trade[j];
         blocking = j;
       }
-    const double shortfall = -chain.gaps()[contact] - along(count, step);
+    const double shortfall = -problem.gaps()[contact] - along(count, step);
     const double to_close = curvature > kDependent * full ? shortfall / curvature : kNever;
     const double length = std::min(to_release, to_close);
     if (!(length < kNever)) return false;
@@ -148,18 +148,18 @@ bool Contacts<Model>::admit(const Chain& chain, Hessian& hessian, int contact, A
       ++active.count;
       return true;
     }
-    release(active, blocking, count + 1);
+    remove_contact(active, blocking, count + 1);
   }
 }
 
 template <class Model>
-int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, const Direction& step) const {
+int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const {
   double reach = 0;  // of any point under the step
   for (const auto& d : step.states) {
     double motion = 0, turn = 0;
     for (int k = 0; k < Model::kSpace; ++k) motion += std::abs(d[k]);
     for (int k = 0; k < Model::kTurn; ++k) turn += std::abs(d[Model::kSpace + k]);
-    reach = std::max(reach, motion + chain.robot().offset * turn);
+    reach = std::max(reach, motion + problem.robot().offset * turn);
   }
   double shift = 0;  // of any mount
   for (const auto& d : step.mounts) {
@@ -169,11 +169,11 @@ int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, 
   }
   reach += shift;
   int worst = -1;
-  double lowest = -kFeasibility * chain.robot().max_length / 2;
-  for (const int c : chain.near()) {
-    const double gap = chain.gaps()[c];
-    if (gap > 2 * reach && c < chain.contacts()) continue;
-    const double predicted = gap + chain.slope(c).along(step);
+  double lowest = -kFeasibility * problem.robot().max_length / 2;
+  for (const int c : problem.near_contacts()) {
+    const double gap = problem.gaps()[c];
+    if (gap > 2 * reach && c < problem.contacts()) continue;
+    const double predicted = gap + problem.slope(c).along(step);
     const auto end = active.contact.begin() + active.count;
     if (predicted < lowest && std::find(active.contact.begin(), end, c) == end) {
       lowest = predicted;
@@ -184,48 +184,48 @@ int Contacts<Model>::most_violated(const Chain& chain, const ActiveSet& active, 
 }
 
 template <class Model>
-bool Contacts<Model>::meet(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
-  settle(chain, active, step);
+bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
+  drop_negative_multipliers(problem, active, step);
   for (int change = 0; change < kActiveSetChanges; ++change) {
-    const int contact = most_violated(chain, active, step);
+    const int contact = most_violated(problem, active, step);
     if (contact < 0) return true;
-    if (!admit(chain, hessian, contact, active, step)) return false;
+    if (!add_violated_gap(problem, kkt, contact, active, step)) return false;
   }
   return false;
 }
 
 template <class Model>
-bool Contacts<Model>::solve(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
+bool ActiveSetQp<Model>::solve(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
   int count = 0;
   for (; count < active.count; ++count)
-    loads_[count] = load(chain, active.contact[count], count, hessian.penalty(count));
+    loads_[count] = linearize_gap(problem, active.contact[count], count, kkt.penalty(count));
   loads_[count++] = {nullptr, &step};
-  hessian.respond(chain, std::span(loads_).first(count));
-  penalize(chain, active, step);
-  return meet(chain, hessian, active, step);
+  kkt.solve(problem, std::span(loads_).first(count));
+  add_penalty_response(problem, active, step);
+  return satisfy_gaps(problem, kkt, active, step);
 }
 
 template <class Model>
-bool Contacts<Model>::restore(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
-  for (int j = 0; j < active.count; ++j) loads_[j] = load(chain, active.contact[j], j, 0);
+bool ActiveSetQp<Model>::restore(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
+  for (int j = 0; j < active.count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
   std::fill_n(active.multiplier.begin(), active.count, kHeld);
   step.clear();
-  hessian.respond(chain, std::span(loads_).first(active.count));
-  return meet(chain, hessian, active, step);
+  kkt.solve(problem, std::span(loads_).first(active.count));
+  return satisfy_gaps(problem, kkt, active, step);
 }
 
 template <class Model>
-bool Contacts<Model>::correct(const Chain& chain, Hessian& hessian, ActiveSet& active, Direction& step) {
+bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
   const Load load{nullptr, &step};
-  hessian.respond(chain, {&load, 1});
-  penalize(chain, active, step);
-  if (!factor(active)) return false;
-  push(closing(chain, active, step), active, step);
+  kkt.solve(problem, {&load, 1});
+  add_penalty_response(problem, active, step);
+  if (!factor_gram(active)) return false;
+  apply(closing_multipliers(problem, active, step), active, step);
   const auto end = active.multiplier.begin() + active.count;
   return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
 }
 
-#define CCR_INSTANTIATE(Model) template class Contacts<Model>;
+#define CCR_INSTANTIATE(Model) template class ActiveSetQp<Model>;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

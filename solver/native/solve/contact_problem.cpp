@@ -29,7 +29,7 @@ void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> n
 }
 
 template <class Model>
-Chain<Model>::Chain(const Robot& robot, int obstacles)
+ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
     : robot_(robot),
       model_(robot),
       origin_(robot.segments + 1),
@@ -38,7 +38,7 @@ Chain<Model>::Chain(const Robot& robot, int obstacles)
       points_(robot.points()),
       gaps_(obstacles * points_.size() + Model::kRod * (1 + 2 * robot.segments), std::numeric_limits<double>::infinity()),
       mount_of_(obstacles, -1),
-      pulls_(robot.segments + 1) {
+      node_forces_(robot.segments + 1) {
   near_.reserve(gaps_.size());
   const int stride = robot.between + 1;
   for (const Vec<2>& line : robot.lines) {
@@ -50,7 +50,7 @@ Chain<Model>::Chain(const Robot& robot, int obstacles)
 }
 
 template <class Model>
-void Chain<Model>::enter(std::span<const Obstacle> obstacles) {
+void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
   obstacles_ = obstacles;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
@@ -63,7 +63,7 @@ void Chain<Model>::enter(std::span<const Obstacle> obstacles) {
 }
 
 template <class Model>
-void Chain<Model>::look_around(std::span<const Position> nodes, const std::vector<Position>& mounts) {
+void ContactProblem<Model>::update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts) {
   std::copy(nodes.begin(), nodes.end(), origin_.begin());
   mount_origin_ = mounts;
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
@@ -73,29 +73,29 @@ void Chain<Model>::look_around(std::span<const Position> nodes, const std::vecto
 }
 
 template <class Model>
-bool Chain<Model>::far(int obstacle, double motion) const {
+bool ContactProblem<Model>::out_of_reach(int obstacle, double motion) const {
   const int mount = mount_of_[obstacle];
   if (mount >= 0) motion += norm(minus(displacements_[mount], mount_origin_[mount]));
   return clear_[obstacle] > drift_ + motion;
 }
 
 template <class Model>
-bool Chain<Model>::evaluate(const Iterate& at) {
+bool ContactProblem<Model>::evaluate(const Iterate& at) {
   if (!model_.evaluate(at.command, at.controls)) return false;
-  load_springs(at.mounts);
+  update_springs(at.mounts);
   fence_energy_ = 0;
   if (fenced_) raise_fence(at.controls);
   for (int i = 0; i <= robot_.segments; ++i)
     for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
   place_points<Model>(robot_, nodes_, frames(), points_);
   measure_gaps();
-  if constexpr (Model::kRod) measure_limits(at.command);
+  if constexpr (Model::kRod) measure_slack_and_disks(at.command);
   return true;
 }
 
 // Half of kFence times the square by which the squared shear, over its limit's, exceeds kFenceShear.
 template <class Model>
-void Chain<Model>::raise_fence(const std::vector<Control>& controls) {
+void ContactProblem<Model>::raise_fence(const std::vector<Control>& controls) {
   fence_slope_.assign(controls.size(), {});
   fence_curvature_.assign(controls.size(), {});
   const double square = model_.widest_shear() * model_.widest_shear();
@@ -116,33 +116,33 @@ void Chain<Model>::raise_fence(const std::vector<Control>& controls) {
 }
 
 template <class Model>
-void Chain<Model>::load_springs(const std::vector<Position>& mounts) {
+void ContactProblem<Model>::update_springs(const std::vector<Position>& mounts) {
   displacements_ = mounts;
   for (std::size_t j = 0; j < obstacles_.size(); ++j)
     if (const int mount = mount_of_[j]; mount >= 0)
-      for (int k = 0; k < kSpace * kSpace; ++k) springs_[mount][k] = obstacles_[j].stiffness[k] / stiffness();
+      for (int k = 0; k < kSpace * kSpace; ++k) springs_[mount][k] = obstacles_[j].spring[k] / energy_scale();
   energy_ = objective() + spring_energy(mounts, model_.segment_length() * robot_.segments);
 }
 
 template <class Model>
-double Chain<Model>::spring_energy(const std::vector<Position>& mounts, double length) const {
+double ContactProblem<Model>::spring_energy(const std::vector<Position>& mounts, double length) const {
   double energy = 0;
   for (std::size_t j = 0; j < obstacles_.size(); ++j)
     if (const int mount = mount_of_[j]; mount >= 0)
-      energy += dot(mounts[mount], times(obstacles_[j].stiffness, mounts[mount])) / 2;
-  return energy / robot_.stiffness(length);
+      energy += dot(mounts[mount], times(obstacles_[j].spring, mounts[mount])) / 2;
+  return energy / robot_.energy_scale(length);
 }
 
 template <class Model>
-void Chain<Model>::relax(Iterate& at) {
+void ContactProblem<Model>::set_free_shape(Iterate& at) {
   at.active.count = 0;
   std::fill(at.mounts.begin(), at.mounts.end(), Position{});
   Control control{};
   if constexpr (Model::kRod)
     if (at.command.cables[0] > 0) {
-      control = model_.relaxed(at.command);
-      at.active.contact[0] = slack();
-      at.active.multiplier[0] = model_.relaxed_push();
+      control = model_.free_control(at.command);
+      at.active.contact[0] = slack_contact();
+      at.active.multiplier[0] = model_.free_slack_multiplier();
       at.active.count = 1;
     }
   std::fill(at.controls.begin(), at.controls.end(), control);
@@ -150,7 +150,7 @@ void Chain<Model>::relax(Iterate& at) {
 
 // Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
 template <class Model>
-void Chain<Model>::measure_gaps() {
+void ContactProblem<Model>::measure_gaps() {
   const int n = robot_.segments, stride = robot_.between + 1;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
@@ -161,9 +161,9 @@ void Chain<Model>::measure_gaps() {
   }
   drift_ = std::sqrt(drift);
   for (int j = 0; j < static_cast<int>(obstacles_.size()); ++j) {
-    if (far(j, 0)) continue;
+    if (out_of_reach(j, 0)) continue;
     const Obstacle& obstacle = obstacles_[j];
-    const Position moved = this->moved(j);
+    const Position moved = this->displacement(j);
     const int first = j * robot_.points();
     for (int i = 0; i <= n; ++i) {
       const double distance = clearance_beyond(obstacle, minus(nodes_[i], moved), reach_);
@@ -182,26 +182,26 @@ void Chain<Model>::measure_gaps() {
 }
 
 template <class Model>
-void Chain<Model>::measure_limits(const Command& command) requires(Model::kRod) {
+void ContactProblem<Model>::measure_slack_and_disks(const Command& command) requires(Model::kRod) {
   const auto add = [this](int contact, double gap) {
     gaps_[contact] = gap;
     near_.push_back(contact);
   };
-  add(slack(), model_.slack(command));
+  add(slack_contact(), model_.slack(command));
   const double close = tolerances::kDisksClose * (model_.segment_length() - robot_.disk_thickness) / robot_.disk_radius;
   if (model_.widest <= close) return;
   for (int i = 0; i < robot_.segments; ++i) {
     const double angle = states()[i][2] - states()[i + 1][2];
     if (std::abs(angle) <= close) continue;
-    const int contact = disks() + 2 * i + (angle < 0);
+    const int contact = first_disk_contact() + 2 * i + (angle < 0);
     add(contact, disk_gap(contact).value);
   }
 }
 
 template <class Model>
-void Chain<Model>::survey(double* gaps) const {
+void ContactProblem<Model>::all_gaps(double* gaps) const {
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
-    ccr::measure_gaps(obstacles_[j], std::span<const Position>(points_), moved(static_cast<int>(j)), gaps);
+    ccr::measure_gaps(obstacles_[j], std::span<const Position>(points_), displacement(static_cast<int>(j)), gaps);
     for (std::size_t k = 0; k < points_.size() && !obstacles_[j].everywhere; ++k)
       if (!obstacles_[j].touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
     gaps += points_.size();
@@ -209,24 +209,24 @@ void Chain<Model>::survey(double* gaps) const {
 }
 
 template <class Model>
-Chain<Model>::Position Chain<Model>::point(int contact) const {
+ContactProblem<Model>::Position ContactProblem<Model>::point(int contact) const {
   const int mount = this->mount(contact);
   const Position& point = points_[contact % points_.size()];
   return mount < 0 ? point : minus(point, displacements_[mount]);
 }
 
 template <class Model>
-Gap<Chain<Model>::kSpace> Chain<Model>::gap(int contact) const {
+Gap<ContactProblem<Model>::kSpace> ContactProblem<Model>::gap(int contact) const {
   return measure_gap(obstacle(contact), point(contact));
 }
 
 template <class Model>
-Chain<Model>::Slope Chain<Model>::slope(int contact) const {
+ContactProblem<Model>::Slope ContactProblem<Model>::slope(int contact) const {
   if constexpr (Model::kRod) {
-    if (contact == slack()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
-    if (contact > slack()) {  // in the angle between two nodes
+    if (contact == slack_contact()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
+    if (contact > slack_contact()) {  // in the angle between two nodes
       const double slope = disk_gap(contact).slope;
-      return {{(contact - disks()) / 2, true, {{0, 0, slope, 0}}, {{0, 0, -slope, 0}}}, -1, {}};
+      return {{(contact - first_disk_contact()) / 2, true, {{0, 0, slope, 0}}, {{0, 0, -slope, 0}}}, -1, {}};
     }
   }
   const Position normal = gap(contact).slope;
@@ -234,7 +234,7 @@ Chain<Model>::Slope Chain<Model>::slope(int contact) const {
 }
 
 template <class Model>
-Chain<Model>::Force Chain<Model>::force(int contact, const Position& on_point) const {
+ContactProblem<Model>::Force ContactProblem<Model>::force(int contact, const Position& on_point) const {
   const Site& site = this->site(contact);
   const auto share = [&](double weight, int node) {
     State share{};
@@ -249,62 +249,62 @@ Chain<Model>::Force Chain<Model>::force(int contact, const Position& on_point) c
 }
 
 template <class Model>
-double Chain<Model>::lever_arm(int contact) const {
-  if (contact == slack()) return robot_.offset * robot_.segments;
-  if (contact > slack()) return robot_.disk_radius;
+double ContactProblem<Model>::lever_arm(int contact) const {
+  if (contact == slack_contact()) return robot_.offset * robot_.segments;
+  if (contact > slack_contact()) return robot_.disk_radius;
   const Site& site = this->site(contact);
   return model_.segment_length() * (site.node + (site.fraction > 0));
 }
 
 template <class Model>
-bool Chain<Model>::touching(const ActiveSet& active) const {
+bool ContactProblem<Model>::touches_obstacle(const ActiveSet& active) const {
   const auto begin = active.contact.begin();
   return std::any_of(begin, begin + active.count, [this](int contact) { return contact < contacts(); });
 }
 
 template <class Model>
-double Chain<Model>::violation() const {
+double ContactProblem<Model>::violation() const {
   double worst = 0;
   for (const int contact : near_) worst = std::max(worst, -gaps_[contact]);
   return worst;
 }
 
 template <class Model>
-double Chain<Model>::tolerance(const ActiveSet& active) const {
-  const double scale = Model::kRod ? model_.steepest : model_.free_turn() * model_.free_turn();
-  double pressed = model_.steepest;  // also by contacts
+double ContactProblem<Model>::tolerance(const ActiveSet& active) const {
+  const double scale = Model::kRod ? model_.max_objective_slope : model_.free_turn() * model_.free_turn();
+  double pressed = model_.max_objective_slope;  // also by contacts
   for (int j = 0; j < active.count; ++j)
     pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));
   return tolerances::kStationarity * scale + tolerances::kRoundoff * pressed;
 }
 
 template <class Model>
-void Chain<Model>::reduced_gradient(const ActiveSet& active) {
-  std::fill(pulls_.begin(), pulls_.end(), State{});
+void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
+  std::fill(node_forces_.begin(), node_forces_.end(), State{});
   for (std::size_t m = 0; m < springs_.size(); ++m) mount_gradient_[m] = times(springs_[m], displacements_[m]);
   for (int j = 0; j < active.count; ++j) {
     const auto& [force, mount, normal] = slope(active.contact[j]);
     if (mount >= 0)
       for (int k = 0; k < kSpace; ++k) mount_gradient_[mount][k] += active.multiplier[j] * normal[k];
     for (int k = 0; k < kState; ++k) {
-      pulls_[force.node][k] += active.multiplier[j] * force.here[k];
-      if (force.split) pulls_[force.node + 1][k] += active.multiplier[j] * force.next[k];
+      node_forces_[force.node][k] += active.multiplier[j] * force.here[k];
+      if (force.split) node_forces_[force.node + 1][k] += active.multiplier[j] * force.next[k];
     }
   }
-  model_.adjoin(pulls_);
+  model_.adjoin(node_forces_);
   if (at_fence())
     for (std::size_t i = 0; i < fence_slope_.size(); ++i) model_.gradient[i] += fence_slope_[i];
 }
 
 template <class Model>
-void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
+void ContactProblem<Model>::lagrangian_hessian(const ActiveSet& active, System& system) const {
   model_.curvature(system);
   if (at_fence())
     for (std::size_t i = 0; i < fence_curvature_.size(); ++i) system.stages[i].huu += fence_curvature_[i];
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     if constexpr (Model::kRod)
-      if (contact > slack()) add_disk_curvature(contact, -active.multiplier[j], system);
+      if (contact > slack_contact()) add_disk_curvature(contact, -active.multiplier[j], system);
     if (contact >= contacts()) continue;  // slack is linear in the state
     const Gap<kSpace> gap = this->gap(contact);
     const Site& site = this->site(contact);
@@ -340,8 +340,8 @@ void Chain<Model>::curvature(const ActiveSet& active, System& system) const {
 }
 
 template <class Model>
-void Chain<Model>::add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod) {
-  const int node = (contact - disks()) / 2;
+void ContactProblem<Model>::add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod) {
+  const int node = (contact - first_disk_contact()) / 2;
   const double curvature = scale * disk_gap(contact).curvature;
   Mat<kState, kState> cross;
   cross(2, 2) = -curvature;
@@ -351,28 +351,39 @@ void Chain<Model>::add_disk_curvature(int contact, double scale, System& system)
 }
 
 template <class Model>
-Chain<Model>::Tensions Chain<Model>::tensions(const ActiveSet& active) const {
-  Tensions tensions = model_.pull_slopes();
+ContactProblem<Model>::Tensions ContactProblem<Model>::tensions(const ActiveSet& active) const {
+  Tensions tensions = model_.displacement_slopes();
   if constexpr (Model::kRod)
     for (int j = 0; j < active.count; ++j)
-      if (active.contact[j] == slack()) tensions[0] = active.multiplier[j];
-  for (double& tension : tensions.v) tension *= stiffness();
+      if (active.contact[j] == slack_contact()) tensions[0] = active.multiplier[j];
+  for (double& tension : tensions.v) tension *= energy_scale();
   return tensions;
 }
 
 template <class Model>
-Chain<Model>::Position Chain<Model>::push(const ActiveSet& active, int obstacle) const {
+ContactProblem<Model>::Position ContactProblem<Model>::contact_force(const ActiveSet& active, int obstacle) const {
   Position force{};
   for (int j = 0; j < active.count; ++j) {
     if (active.contact[j] >= contacts() || active.contact[j] / static_cast<int>(points_.size()) != obstacle) continue;
     const Gap<kSpace> gap = this->gap(active.contact[j]);
-    for (int k = 0; k < kSpace; ++k) force[k] += stiffness() * active.multiplier[j] * gap.slope[k];
+    for (int k = 0; k < kSpace; ++k) force[k] += energy_scale() * active.multiplier[j] * gap.slope[k];
   }
   return force;
 }
 
+template <class Model>
+ContactProblem<Model>::Position ContactProblem<Model>::mount_load(const ActiveSet& active, int mount) const {
+  Position load{};
+  for (int j = 0; j < active.count; ++j)
+    if (this->mount(active.contact[j]) == mount) {
+      const Position normal = slope(active.contact[j]).normal;
+      for (int k = 0; k < kSpace; ++k) load[k] += active.multiplier[j] * normal[k];
+    }
+  return load;
+}
+
 #define CCR_INSTANTIATE(Model)                                                                                   \
-  template class Chain<Model>;                                                                                   \
+  template class ContactProblem<Model>;                                                                                   \
   template void place_points<Model>(const Robot&, std::span<const Position<Model::kSpace>>,                      \
                                     std::span<const Model::Frame>, std::vector<Position<Model::kSpace>>&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)

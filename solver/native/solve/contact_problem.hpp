@@ -12,7 +12,7 @@
 
 namespace ccr {
 
-// Contacts that carry a multiplier. A contact is (obstacle * lines + line) * positions + position. After the last of these
+// ActiveSetQp that carry a multiplier. A contact is (obstacle * lines + line) * positions + position. After the last of these
 // come, with a sliding cable, its slack, and of each segment where its disks meet on the side of the cable and opposite.
 struct ActiveSet {
   int count = 0;
@@ -43,7 +43,7 @@ void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> n
                   std::span<const typename Model::Frame> frames, std::vector<Position<Model::kSpace>>& points);
 
 template <class Model>
-class Chain {
+class ContactProblem {
  public:
   static constexpr int kSpace = Model::kSpace, kState = Model::kState;
   using Position = ccr::Position<kSpace>;
@@ -71,13 +71,13 @@ class Chain {
   };
 
   // For scenes of this many obstacles.
-  Chain(const Robot& robot, int obstacles);
+  ContactProblem(const Robot& robot, int obstacles);
 
-  // Goes among the obstacles of a scene, which must stay where they are while the chain is.
-  void enter(std::span<const Obstacle> obstacles);
+  // Goes among the obstacles of a scene, which must stay where they are while the problem is.
+  void set_obstacles(std::span<const Obstacle> obstacles);
 
   // Measures how far each obstacle is from a shape, so that it can be passed over while the robot stays close to it.
-  void look_around(std::span<const Position> nodes, const std::vector<Position>& mounts);
+  void update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts);
 
   // Shape under the command; false when a coordinate leaves the range of the segment law.
   bool evaluate(const Iterate& at);
@@ -88,38 +88,39 @@ class Chain {
   bool at_fence() const { return fence_energy_ > 0; }  // of the last shape
 
   // The shape that no obstacle touches, which is known, and what holds it.
-  void relax(Iterate& at);
+  void set_free_shape(Iterate& at);
 
   // Slope of the Lagrangian J - Σ λ c with respect to the controls, with the adjoints it is made of.
   void reduced_gradient(const ActiveSet& active);
   // Exact Hessian of the Lagrangian, and the tensions of the cables; both follow reduced_gradient.
-  void curvature(const ActiveSet& active, System& system) const;
+  void lagrangian_hessian(const ActiveSet& active, System& system) const;
   Tensions tensions(const ActiveSet& active) const;
-  Position push(const ActiveSet& active, int obstacle) const;  // its force on the robot [N]
+  Position contact_force(const ActiveSet& active, int obstacle) const;  // its force on the robot [N]
+  Position mount_load(const ActiveSet& active, int mount) const;  // Σ λ ∇c of the contacts on a mount
 
   // Slopes of the tip of a robot that nothing touches in the cable displacements (eq. 7).
   auto free_slopes(const Command& command) { return model_.free_slopes(command); }
 
   const Robot& robot() const { return robot_; }
   std::span<const Obstacle> obstacles() const { return obstacles_; }
-  // Contacts with obstacles, then the slack of a sliding cable, then the first of the disks that meet.
+  // ActiveSetQp with obstacles, then the slack of a sliding cable, then the first of the disks that meet.
   int contacts() const { return static_cast<int>(mount_of_.size() * points_.size()); }
-  bool touching(const ActiveSet& active) const;  // any obstacle
+  bool touches_obstacle(const ActiveSet& active) const;  // any obstacle
 
   double objective() const { return model_.objective; }
-  double energy() const { return energy_; }  // the objective and that of the springs, over the stiffness [rad^2]
-  double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the stiffness [rad^2]
+  double energy() const { return energy_; }  // the objective and that of the springs, over the energy scale [rad^2]
+  double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the energy scale [rad^2]
   double violation() const;  // largest -gap, at least 0
   double tolerance(const ActiveSet& active) const;  // of the slope of the Lagrangian
-  double stiffness() const { return robot_.stiffness(model_.segment_length() * robot_.segments); }
+  double energy_scale() const { return robot_.energy_scale(model_.segment_length() * robot_.segments); }
   const std::vector<State>& states() const { return model_.states; }
   const std::vector<Frame>& frames() const { return model_.frames; }
   const std::vector<Position>& points() const { return points_; }  // (line, position)
-  // Contacts within reach, and the gap of every contact, infinite for those that are not.
-  const std::vector<int>& near() const { return near_; }
+  // ActiveSetQp within reach, and the gap of every contact, infinite for those that are not.
+  const std::vector<int>& near_contacts() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
-  bool far(int obstacle, double motion) const;  // from any point, even after such a motion
-  void survey(double* gaps) const;  // of every contact, whether within reach or not
+  bool out_of_reach(int obstacle, double motion) const;  // from any point, even after such a motion
+  void all_gaps(double* gaps) const;  // of every contact, whether within reach or not
   Gap<kSpace> gap(int contact) const;                         // with its derivatives in the point
   Force force(int contact, const Position& on_point) const;   // on the nodes, of one on the point
   Slope slope(int contact) const;
@@ -128,8 +129,8 @@ class Chain {
   int mount_of(int obstacle) const { return mount_of_[obstacle]; }
   const Mat<kSpace, kSpace>& spring(int mount) const { return springs_[mount]; }  // its stiffness over the robot's
   const std::vector<Position>& mount_gradient() const { return mount_gradient_; }
-  int slack() const { return contacts(); }
-  int disks() const { return contacts() + 1; }
+  int slack_contact() const { return contacts(); }
+  int first_disk_contact() const { return contacts() + 1; }
   double lever_arm(int contact) const;  // of its motion per unit of a control, about [mm]
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
@@ -145,14 +146,14 @@ class Chain {
   Position point(int contact) const;  // in the frame of the mount
   const Site& site(int contact) const { return sites_[contact % points_.size()]; }
   Position lever(const Site& site, int node) const { return Model::lever(model_.frames[node], site.line); }
-  Position moved(int obstacle) const { return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]]; }
+  Position displacement(int obstacle) const { return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]]; }
   void add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod);
   void raise_fence(const std::vector<Control>& controls);
-  void load_springs(const std::vector<Position>& mounts);
+  void update_springs(const std::vector<Position>& mounts);
   void measure_gaps();
-  void measure_limits(const Command& command) requires(Model::kRod);
+  void measure_slack_and_disks(const Command& command) requires(Model::kRod);
   DiskGap disk_gap(int contact) const requires(Model::kRod) {
-    return model_.disk_gap((contact - disks()) / 2, (contact - disks()) % 2 == 0 ? 1 : -1);
+    return model_.disk_gap((contact - first_disk_contact()) / 2, (contact - first_disk_contact()) % 2 == 0 ? 1 : -1);
   }
 
   Robot robot_;
@@ -177,7 +178,7 @@ class Chain {
   std::vector<Mat<kSpace, kSpace>> springs_;       // of the mounts
   std::vector<Position> displacements_;            // of the mounts
   std::vector<Position> mount_gradient_;
-  std::vector<State> pulls_;     // Σ λ ∇c at each node
+  std::vector<State> node_forces_;     // Σ λ ∇c at each node
 };
 
 }  // namespace ccr

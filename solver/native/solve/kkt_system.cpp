@@ -27,7 +27,7 @@ void Direction<Model>::add(double scale, const Direction& other) {
 }
 
 template <class Model>
-Hessian<Model>::Hessian(int segments, int mounts)
+KktSystem<Model>::KktSystem(int segments, int mounts)
     : system_(segments),
       penalty_(kMaxActive),
       mount_hessian_(mounts),
@@ -52,33 +52,33 @@ Mat<N, N> outer(double scale, const Vec<N>& a, const Vec<N>& b) {
 }  // namespace
 
 template <class Model>
-void Hessian<Model>::shape(const Chain& chain, const ActiveSet& active, double strength) {
-  chain.curvature(active, system_);
-  steepest_ = 0;
+void KktSystem<Model>::assemble(const ContactProblem& problem, const ActiveSet& active, double strength) {
+  problem.lagrangian_hessian(active, system_);
+  max_curvature_ = 0;
   for (const auto& stage : system_.stages)
-    for (int k = 0; k < Model::kShears; ++k) steepest_ = std::max(steepest_, std::abs(stage.huu(k, k)));
+    for (int k = 0; k < Model::kShears; ++k) max_curvature_ = std::max(max_curvature_, std::abs(stage.huu(k, k)));
   for (int j = 0; j < active.count; ++j) {
-    const Force slope = chain.slope(active.contact[j]).force;
-    const double arm = chain.lever_arm(active.contact[j]);
-    penalty_[j] = strength * steepest_ / (arm * arm);
+    const Force slope = problem.slope(active.contact[j]).force;
+    const double arm = problem.lever_arm(active.contact[j]);
+    penalty_[j] = strength * max_curvature_ / (arm * arm);
     system_.node_hessian[slope.node] += outer(penalty_[j], slope.here, slope.here);
     if (!slope.split) continue;
     system_.node_hessian[slope.node + 1] += outer(penalty_[j], slope.next, slope.next);
     system_.couple(slope.node, outer(penalty_[j], slope.here, slope.next));
   }
-  shape_mounts(chain, active);
+  assemble_mounts(problem, active);
 }
 
 // A point on a mounted obstacle has the Hessian -λ∇²c + penalty ∇c∇cᵀ in its place; so has the mount, and the two of
 // them together the opposite.
 template <class Model>
-void Hessian<Model>::shape_mounts(const Chain& chain, const ActiveSet& active) {
+void KktSystem<Model>::assemble_mounts(const ContactProblem& problem, const ActiveSet& active) {
   touched_ = 0;
-  arm_ = chain.robot().max_length / chain.robot().segments;
-  for (std::size_t m = 0; m < mount_hessian_.size(); ++m) mount_hessian_[m] = chain.spring(m);
+  arm_ = problem.robot().max_length / problem.robot().segments;
+  for (std::size_t m = 0; m < mount_hessian_.size(); ++m) mount_hessian_[m] = problem.spring(m);
   if (mount_hessian_.empty()) return;
   for (int j = 0; j < active.count; ++j) {
-    const int mount = chain.mount(active.contact[j]);
+    const int mount = problem.mount(active.contact[j]);
     if (mount < 0) continue;
     int first = 0;
     while (first < touched_ && columns_[first].mount != mount) first += kSpace;
@@ -90,26 +90,26 @@ void Hessian<Model>::shape_mounts(const Chain& chain, const ActiveSet& active) {
         columns_[first + k].forces.clear();
       }
     }
-    const Gap<kSpace> gap = chain.gap(active.contact[j]);
+    const Gap<kSpace> gap = problem.gap(active.contact[j]);
     Mat<kSpace, kSpace> stiffening = gap.curvature(active.multiplier[j]);
     stiffening -= outer(penalty_[j], gap.slope, gap.slope);
     mount_hessian_[mount] -= stiffening;
     for (int k = 0; k < kSpace; ++k) {
       Position<kSpace> column;
       for (int r = 0; r < kSpace; ++r) column[r] = stiffening(r, k);
-      columns_[first + k].forces.push_back(chain.force(active.contact[j], column));
+      columns_[first + k].forces.push_back(problem.force(active.contact[j], column));
     }
   }
 }
 
 template <class Model>
-bool Hessian<Model>::factor(double damping) {
+bool KktSystem<Model>::factor(double damping) {
   ++factorizations;
   return system_.factor(damping) && (mount_hessian_.empty() || factor_mounts(damping / (arm_ * arm_)));
 }
 
 template <class Model>
-bool Hessian<Model>::factor_mounts(double damping) {
+bool KktSystem<Model>::factor_mounts(double damping) {
   for (std::size_t m = 0; m < mount_hessian_.size(); ++m) {
     mount_factor_[m] = mount_hessian_[m];
     for (int k = 0; k < kSpace; ++k) mount_factor_[m](k, k) += damping;
@@ -134,9 +134,9 @@ bool Hessian<Model>::factor_mounts(double damping) {
   return true;
 }
 
-// From the response of the chain alone, and the load of the mounts in their place, to that of all together.
+// From the response of the problem alone, and the load of the mounts in their place, to that of all together.
 template <class Model>
-void Hessian<Model>::complete(Direction& response) {
+void KktSystem<Model>::couple_mounts(Direction& response) {
   for (int a = 0; a < touched_; ++a) {
     moves_[a] = response.mounts[columns_[a].mount][columns_[a].axis];
     for (const Force& force : columns_[a].forces) moves_[a] -= force.along(response.states);
@@ -155,11 +155,11 @@ void Hessian<Model>::complete(Direction& response) {
 }
 
 template <class Model>
-void Hessian<Model>::respond(const Chain& chain, std::span<const Load> loads) {
+void KktSystem<Model>::solve(const ContactProblem& problem, std::span<const Load> loads) {
   for (std::size_t k = 0; k < loads.size(); ++k) {
     Direction& response = *loads[k].response;
     const Slope* gap = loads[k].gap;
-    loads_[k] = {gap ? nullptr : chain.gradient().data(), gap ? std::span(&gap->force, 1) : std::span<const Force>(),
+    loads_[k] = {gap ? nullptr : problem.gradient().data(), gap ? std::span(&gap->force, 1) : std::span<const Force>(),
                  response.controls.data(), response.states.data()};
   }
   system_.respond(std::span(loads_).first(loads.size()));
@@ -168,16 +168,16 @@ void Hessian<Model>::respond(const Chain& chain, std::span<const Load> loads) {
     std::vector<Position<kSpace>>& mounts = load.response->mounts;
     for (std::size_t m = 0; m < mounts.size(); ++m) {
       mounts[m] = {};
-      if (!load.gap) mounts[m] -= chain.mount_gradient()[m];
+      if (!load.gap) mounts[m] -= problem.mount_gradient()[m];
       if (load.gap && load.gap->mount == static_cast<int>(m)) mounts[m] -= load.gap->normal;
     }
-    complete(*load.response);
+    couple_mounts(*load.response);
   }
 }
 
 #define CCR_INSTANTIATE(Model)     \
   template struct Direction<Model>; \
-  template class Hessian<Model>;
+  template class KktSystem<Model>;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

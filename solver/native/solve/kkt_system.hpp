@@ -23,30 +23,30 @@ struct Direction {
 };
 
 template <class Model>
-class Hessian {
+class KktSystem {
  public:
-  using Chain = ccr::Chain<Model>;
+  using ContactProblem = ccr::ContactProblem<Model>;
   using Direction = ccr::Direction<Model>;
-  using Slope = typename Chain::Slope;
+  using Slope = typename ContactProblem::Slope;
 
-  // Something to respond to, a slope of a gap or else that of the Lagrangian at the chain, and where its response goes.
+  // Something to respond to, a slope of a gap or else that of the Lagrangian at the problem, and where its response goes.
   struct Load {
     const Slope* gap;
     Direction* response;
   };
 
-  Hessian(int segments, int mounts);
+  KktSystem(int segments, int mounts);
 
   // Takes the curvature at a shape, with a penalty on each active gap of this strength over the largest curvature.
-  void shape(const Chain& chain, const ActiveSet& active, double strength);
+  void assemble(const ContactProblem& problem, const ActiveSet& active, double strength);
   // True exactly when it is positive definite, with this damping of all unknowns.
   bool factor(double damping);
   // H⁻¹ times the slope of a gap, or -H⁻¹ times that of the Lagrangian.
-  void respond(const Chain& chain, std::span<const Load> loads);
+  void solve(const ContactProblem& problem, std::span<const Load> loads);
 
   std::int64_t factorizations = 0;  // so far
   double penalty(int j) const { return penalty_[j]; }  // on an active gap, in their order
-  double steepest() const { return steepest_; }        // largest curvature of a control
+  double max_curvature() const { return max_curvature_; }        // largest curvature of a control
 
  private:
   static constexpr int kSpace = Model::kSpace;
@@ -54,16 +54,16 @@ class Hessian {
   using System = typename Model::System;
   using Force = typename System::Force;
 
-  // One of the directions a touched mount can move in: the forces that puts on the chain, and its response.
+  // One of the directions a touched mount can move in: the forces that puts on the problem, and its response.
   struct Column {
     int mount, axis;
     std::vector<Force> forces;
     Direction response;
   };
 
-  void shape_mounts(const Chain& chain, const ActiveSet& active);
+  void assemble_mounts(const ContactProblem& problem, const ActiveSet& active);
   bool factor_mounts(double damping);
-  void complete(Direction& response);
+  void couple_mounts(Direction& response);
 
   System system_;
   std::vector<double> penalty_;
@@ -72,7 +72,7 @@ class Hessian {
   int touched_ = 0;             // columns in use
   std::vector<double> schur_;   // Cholesky factor, (touched, touched)
   std::vector<double> moves_;   // of the touched columns
-  double steepest_ = 0;
+  double max_curvature_ = 0;
   double arm_ = 1;              // turns the damping of a control into that of a displacement [mm]
   std::vector<typename System::Load> loads_;
 };

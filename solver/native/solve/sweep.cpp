@@ -67,7 +67,7 @@ double depth(const Obstacle<D>& obstacle, const Position<D>& point) {
   if (!obstacle.outline.empty())  // of a shape whose gap is no distance
     return gap > 0 ? 0.0 : nearest(obstacle.outline, point);
   if (!quadratic(obstacle)) return -gap;
-  const double radius = obstacle.fineness;
+  const double radius = obstacle.min_curvature_radius;
   return radius - std::sqrt(std::max(0.0, radius * (radius + 2 * gap)));
 }
 
@@ -75,7 +75,7 @@ template <int D>
 double distance_outside(const Obstacle<D>& obstacle, double gap) {
   if (!obstacle.outline.empty()) return 0;
   if (!quadratic(obstacle) || std::isinf(gap)) return gap;
-  const double radius = obstacle.fineness;
+  const double radius = obstacle.min_curvature_radius;
   return std::sqrt(std::max(0.0, radius * (radius + 2 * gap))) - radius;
 }
 
@@ -113,7 +113,7 @@ bool edge_clear(const Obstacle<D>& obstacle, const Edge<D>& from, const Edge<D>&
 // A way between points outside is nowhere deeper than half its length, and less so where the surface is round.
 template <int D>
 double harmless_path(const Obstacle<D>& obstacle) {
-  return std::max(kSweepStride * obstacle.fineness, 2 * kSweepDepth * obstacle.inradius);
+  return std::max(kSweepStride * obstacle.min_curvature_radius, 2 * kSweepDepth * obstacle.inradius);
 }
 
 // A point of the core lies nearer than R - h/2 to the middle of a ball of the radius of curvature R inside the obstacle.
@@ -122,7 +122,7 @@ double harmless_path(const Obstacle<D>& obstacle) {
 template <int D>
 double harmless_motion(const Obstacle<D>& obstacle, double longest) {
   if (obstacle.wall()) return HUGE_VAL;
-  return 2 * std::sqrt(longest * std::max(0.0, obstacle.fineness - longest / 2));
+  return 2 * std::sqrt(longest * std::max(0.0, obstacle.min_curvature_radius - longest / 2));
 }
 
 #define CCR_INSTANTIATE(D)                                                                                 \

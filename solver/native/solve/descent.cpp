@@ -1,0 +1,128 @@
+// What happens after the end of a branch: the robot descends, feasibly and in small motions, to where it goes.
+#include <algorithm>
+#include <cmath>
+
+#include "model/models.hpp"
+#include "solve/model_continuation.hpp"
+
+namespace ccr {
+
+using namespace tolerances;
+
+// Descends from `present_`, whose branch ends within the smallest step, to a stable equilibrium under a command part of the
+// way to this one; back to `present_` where there is none, or where the motor would have to hold too much.
+template <class Model>
+ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command) {
+  const bool motor_holds = !only_releases(command);
+  descent_start_ = present_;
+  descent_points_ = points_;
+  descent_mounts_ = mounts_;
+  descent_trace_ = shapes_ ? shapes_->size() : 0;
+  present_evaluated_ = false;
+  problem_.fence(true);
+  bool moved = newton_.set_metric(present_) && leave_towards(command), folded = false;
+  for (int i = 0; i < kDescentIterations && moved && !work_is_spent(); ++i) {
+    std::swap(present_, trial_);
+    record_shape();
+    const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton();
+    const bool ended = finished || descend_once(moved);
+    folded = !finished && problem_.at_fence();
+    if (!ended) continue;
+    if (folded && !try_newton()) break;
+    return finish_descent(motor_holds);
+  }
+  result_.reason = work_is_spent() ? Reason::kWork : folded ? Reason::kFolded : Reason::kStuck;
+  return undo_descent(End::kStuck);
+}
+
+template <class Model>
+ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool motor_holds) {
+  problem_.fence(false);
+  present_evaluated_ = false;
+  clear_trend();
+  evaluate_present();
+  if (highest(tensions_) > problem_.robot().max_tension) {
+    if (motor_holds) return undo_descent(End::kOverTension);
+    keep_last_held(descent_start_);
+  }
+  double farthest = 0;
+  for (std::size_t k = 0; k < points_.size(); ++k)
+    farthest = std::max(farthest, norm(minus(points_[k], descent_points_[k])));
+  return farthest > kStill * problem_.robot().max_length ? End::kSnapped : End::kPassed;
+}
+
+template <class Model>
+ModelContinuation<Model>::End ModelContinuation<Model>::undo_descent(End end) {
+  problem_.fence(false);
+  present_ = descent_start_;
+  points_ = descent_points_;
+  mounts_ = descent_mounts_;
+  if (shapes_) shapes_->resize(descent_trace_);
+  present_evaluated_ = false;
+  evaluate_present();
+  return end;
+}
+
+// Leaves in `trial_` a feasible shape under a command at least kSmallestPart of the way to this one.
+template <class Model>
+bool ModelContinuation<Model>::leave_towards(const Command& command) {
+  for (double part = 1; part >= kSmallestPart; part /= 8) {
+    const Command nearer = between(present_.command, command, part);
+    if (restore_at(nearer, true) || restore_at(nearer, false)) return true;
+  }
+  return false;
+}
+
+// Leaves in `trial_` the feasible shape closest to `present_` under a command, with the active gaps held closed or not.
+template <class Model>
+bool ModelContinuation<Model>::restore_at(const Command& command, bool holding) {
+  trial_ = present_;
+  trial_.command = command;
+  if (!holding) trial_.active.count = 0;
+  return newton_.restore(trial_) && trial_is_close();
+}
+
+// One iterate of the descent from `present_` to `trial_`, shortened until nothing is jumped over. True at an equilibrium.
+template <class Model>
+bool ModelContinuation<Model>::descend_once(bool& moved) {
+  double cap = kDescentCap;
+  for (int shortening = 0; shortening < kDescentShortenings; ++shortening, cap /= 4) {
+    trial_ = present_;
+    ++result_.iterations;
+    const NewtonResult found = newton_.descend_once(trial_, cap);
+    moved = found.moved;
+    if (found.converged) return true;
+    if (!moved || trial_is_close()) return false;
+  }
+  moved = false;
+  return false;
+}
+
+// The quadratic end of a descent: true where Newton's method stays close and loses energy.
+template <class Model>
+bool ModelContinuation<Model>::try_newton() {
+  const double energy = problem_.energy();
+  trial_ = present_;
+  problem_.fence(false);
+  const NewtonResult found = newton_.solve(trial_, 0);
+  problem_.fence(true);
+  result_.iterations += found.iterations;
+  if (!found.converged || problem_.energy() > energy || !trial_is_close()) return false;
+  std::swap(present_, trial_);
+  record_shape();
+  return true;
+}
+
+// Whether an iterate of the descent is near the last one, and nothing was passed through on the way.
+template <class Model>
+bool ModelContinuation<Model>::trial_is_close() const {
+  const double moved = largest_motion();
+  return moved <= kDescentMove * problem_.robot().max_length && passage_is_clear(moved);
+}
+
+#define CCR_INSTANTIATE(Model) \
+  template ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command&);
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
+
+}  // namespace ccr

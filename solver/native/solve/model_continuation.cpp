@@ -1,0 +1,347 @@
+// An equilibrium followed along its branch, by sub-steps that are halved until each continues it.
+#include "solve/model_continuation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/models.hpp"
+
+namespace ccr {
+
+using namespace tolerances;
+
+template <class Model>
+struct ModelContinuation<Model>::Pursuit {
+  Command wanted;  // the command, less what stalled cables do not meet
+  double step = kLargestStep;
+  double yielding = kYield;  // least displacement of the next yield [a]
+  bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
+  int ends = 0;              // of branches
+  Status reached = Status::kConverged;
+  bool over = false;  // with `reached`
+};
+
+template <class Model>
+ModelContinuation<Model>::ModelContinuation(const Robot& robot, int obstacles)
+    : layout_(make_block_layout<Model>({.segments = robot.segments,
+                                        .lines = static_cast<int>(robot.lines.size()),
+                                        .positions = robot.positions(),
+                                        .obstacles = obstacles})),
+      newton_(robot, obstacles),
+      nodes_(robot.segments + 1),
+      frames_(robot.segments + 1),
+      points_(robot.points()) {
+  present_.controls.resize(robot.segments);
+  trend_.controls.resize(robot.segments);
+}
+
+template <class Model>
+void ModelContinuation<Model>::set_obstacles(std::span<const Obstacle<kSpace>> obstacles) {
+  newton_.set_obstacles(obstacles);
+  trend_.mounts.resize(problem_.mounts());
+  present_.mounts.resize(problem_.mounts());
+  trial_ = present_;
+}
+
+// Distance of two commands, in displacements of a cable [a].
+template <class Model>
+double ModelContinuation<Model>::command_distance(const Command& a, const Command& b) const {
+  const Robot& robot = problem_.robot();
+  double farthest = 0;
+  for (int k = 0; k < kCables; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
+  return std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
+}
+
+// The travel that the trend is a slope in: signed for one cable; several cables move evenly while their trend lasts.
+template <class Model>
+double ModelContinuation<Model>::travel(const Command& from, const Command& to) const {
+  return kCables == 1 ? to.cables[0] - from.cables[0] : command_distance(from, to);
+}
+
+template <class Model>
+bool ModelContinuation<Model>::pulls_cable(const Command& command) const {
+  for (int k = 0; k < kCables; ++k)
+    if (std::abs(command.cables[k]) > std::abs(present_.command.cables[k])) return true;
+  return false;
+}
+
+template <class Model>
+bool ModelContinuation<Model>::only_releases(const Command& command) const {
+  return !pulls_cable(command) && command.length == present_.command.length && !(command == present_.command);
+}
+
+template <class Model>
+void ModelContinuation<Model>::record_shape() {
+  points_ = problem_.points();
+  mounts_ = present_.mounts;
+  if (!shapes_) return;
+  for (const auto& s : problem_.states()) shapes_->insert(shapes_->end(), s.v.begin(), s.v.begin() + 3);
+  for (const Position& point : points_) shapes_->insert(shapes_->end(), point.v.begin(), point.v.end());
+  for (std::size_t j = 0; j < problem_.obstacles().size(); ++j) {
+    const int mount = problem_.mount_of(static_cast<int>(j));
+    const Position moved = mount < 0 ? Position{} : mounts_[mount];
+    shapes_->insert(shapes_->end(), moved.v.begin(), moved.v.end());
+  }
+}
+
+// Makes `trial_`, at which the problem is evaluated, the present equilibrium.
+template <class Model>
+void ModelContinuation<Model>::accept() {
+  update_trend();
+  const double limit = problem_.robot().max_tension;
+  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) keep_last_held(present_);
+  std::swap(present_, trial_);
+  tensions_ = trial_tensions_;
+  energy_ = problem_.energy();
+  present_evaluated_ = true;
+  record_shape();
+}
+
+// The difference quotient from `present_` to `trial_`; zero for a free robot and where the active set changed.
+template <class Model>
+void ModelContinuation<Model>::update_trend() {
+  const ActiveSet &before = present_.active, &now = trial_.active;
+  const double travelled = travel(present_.command, trial_.command);
+  clear_trend();
+  if (travelled == 0 || trial_.command.length != present_.command.length || !problem_.touches_obstacle(now) ||
+      before.count != now.count || !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
+    return;
+  const auto slope = [&](const auto& now, const auto& before, auto& slope) {
+    for (std::size_t k = 0; k < slope.v.size(); ++k) slope[k] = (now[k] - before[k]) / travelled;
+  };
+  for (std::size_t i = 0; i < trend_.controls.size(); ++i)
+    slope(trial_.controls[i], present_.controls[i], trend_.controls[i]);
+  for (std::size_t m = 0; m < trend_.mounts.size(); ++m) slope(trial_.mounts[m], present_.mounts[m], trend_.mounts[m]);
+  for (int j = 0; j < now.count; ++j) trend_.multipliers[j] = (now.multiplier[j] - before.multiplier[j]) / travelled;
+}
+
+template <class Model>
+void ModelContinuation<Model>::clear_trend() {
+  std::fill(trend_.controls.begin(), trend_.controls.end(), Control{});
+  std::fill(trend_.mounts.begin(), trend_.mounts.end(), Position{});
+  trend_.multipliers.fill(0);
+}
+
+// Moves `trial_` from `present_` along the trend, with multipliers >= 0.
+template <class Model>
+void ModelContinuation<Model>::extrapolate_trial() {
+  has_trend_ = false;
+  const double travelled = travel(present_.command, trial_.command);
+  const auto extrapolate = [&](auto& at, const auto& slope) {
+    for (std::size_t k = 0; k < slope.v.size(); ++k) at[k] += travelled * slope[k];
+  };
+  for (std::size_t i = 0; i < trend_.controls.size(); ++i) {
+    extrapolate(trial_.controls[i], trend_.controls[i]);
+    has_trend_ |= trial_.controls[i].v != present_.controls[i].v;
+  }
+  predicted_ = trial_.controls;
+  for (std::size_t m = 0; m < trend_.mounts.size(); ++m) extrapolate(trial_.mounts[m], trend_.mounts[m]);
+  for (int j = 0; j < trial_.active.count; ++j)
+    trial_.active.multiplier[j] = std::max(0.0, trial_.active.multiplier[j] + travelled * trend_.multipliers[j]);
+}
+
+template <class Model>
+void ModelContinuation<Model>::evaluate_present() {
+  if (present_evaluated_) return;
+  problem_.evaluate(present_);
+  problem_.reduced_gradient(present_.active);
+  tensions_ = problem_.tensions(present_.active);
+  energy_ = problem_.energy();
+  present_evaluated_ = true;
+}
+
+// The command that is gone for: while anything touches, the cables are not slackened below a pretension, where they alone
+// give the robot its shape.
+template <class Model>
+ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(Command wanted) const {
+  const double pretension = kPretension * problem_.robot().offset;
+  if (Model::kRod || largest_displacement(wanted.cables) >= pretension || !problem_.touches_obstacle(present_.active))
+    return wanted;
+  int taut = 0;
+  for (int k = 1; k < kCables; ++k)
+    if (std::abs(present_.command.cables[k]) > std::abs(present_.command.cables[taut])) taut = k;
+  const double present = present_.command.cables[taut];
+  const double least = std::min(std::abs(present), pretension);
+  if (std::abs(wanted.cables[taut]) < least) wanted.cables[taut] = std::copysign(least, present);
+  return wanted;
+}
+
+template <class Model>
+Status ModelContinuation<Model>::pursue(const Command& target) {
+  Pursuit pursuit{.wanted = target};
+  const double limit = problem_.robot().max_tension;
+  const int steps = kSubSteps + static_cast<int>(2 * command_distance(present_.command, target) / kLargestStep);
+  for (int sub = 0; sub < steps && pursuit.ends < kBranchEnds && !work_is_spent(); ++sub) {
+    // A release may lead to more tension than a motor holds: it yields until it holds again.
+    if (highest(tensions_) > limit) {
+      if (yield_cables(pursuit.wanted, pursuit.yielding)) {
+        pursuit.reached = std::max(pursuit.reached, Status::kStalled);
+        clear_trend();
+        pursuit.yielding *= 2;
+      } else if (is_unyielding()) {
+        return Status::kStalled;
+      }
+    } else {
+      pursuit.yielding = kYield;
+    }
+    const Command goal = raise_to_pretension(pursuit.wanted);
+    const double remaining = command_distance(present_.command, goal);
+    if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;
+  }
+  result_.reason = Reason::kWork;
+  return Status::kGaveUp;
+}
+
+// One sub-step towards a command at a distance; false at the end of the pursuit.
+template <class Model>
+bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
+  double& step = pursuit.step;
+  bool stalled = kCables == 1 && is_at_tension_limit() && pulls_cable(goal) && goal.length == present_.command.length;
+  const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
+  const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
+  const Move move = stalled ? Move::kOverTension : try_command(next);
+  if (move == Move::kAccepted) {
+    accept();
+    step = pursuit.refined ? size : std::min(2 * size, kLargestStep);
+    pursuit.refined = false;
+  } else if (move == Move::kOverTension) {
+    stalled = stalled || approach_tension_limit();
+    step = size / 2;
+  } else if (size > kSmallestStep || (size > kTightStep && is_tight() && !is_blocked(next))) {
+    step = size / 2;
+    pursuit.refined = true;
+  } else {
+    const End end = descend_from_end(next);
+    if (end == End::kStuck) {
+      pursuit.reached = is_blocked(next) ? Status::kBlocked : Status::kGaveUp;
+      return false;
+    }
+    stalled = end == End::kOverTension;
+    if (end == End::kSnapped) pursuit.reached = std::max(pursuit.reached, Status::kSnapped);
+    step = 2 * kSmallestStep;
+    pursuit.refined = false;
+    ++pursuit.ends;
+  }
+  if (!stalled) return true;
+  pursuit.reached = std::max(pursuit.reached, Status::kStalled);
+  if (!hold_stalled_cables(pursuit.wanted)) return false;
+  clear_trend();
+  return true;
+}
+
+// Tensions of the free robot where it first touches, found by bisection between the start of the step and `present_`, each
+// with the sign of its displacement.
+template <class Model>
+ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command& start) {
+  const auto clear = [&](double part) {
+    trial_.command = between(start, present_.command, part);
+    problem_.set_free_shape(trial_);
+    return problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
+  };
+  double low = 0, high = 1;
+  if (!clear(high))
+    for (int i = 0; i < kOnsetBisections; ++i) {
+      const double middle = (low + high) / 2;
+      (clear(middle) ? low : high) = middle;
+    }
+  clear(high);
+  problem_.reduced_gradient(trial_.active);
+  Tensions tensions = problem_.tensions(trial_.active);
+  for (int k = 0; k < kCables; ++k)
+    if (trial_.command.cables[k] < 0) tensions[k] = -tensions[k];
+  return tensions;
+}
+
+template <class Model>
+StepResult ModelContinuation<Model>::follow(const double* from, const double* target, double* to) {
+  result_ = {};
+  factorizations_before_ = newton_.factorizations();
+  was_exceeded_ = false;
+  read_block(from);
+  const Command start = present_.command;
+  Command wanted;
+  std::copy_n(target, kCables, wanted.cables.v.begin());
+  wanted.length = target[kCables];
+  if (shapes_) {
+    evaluate_present();
+    record_shape();
+  }
+  result_.status = pursue(wanted);
+  if (was_exceeded_ && highest(tensions_) > problem_.robot().max_tension) {  // the step ended amid a yield
+    present_ = last_held_;
+    present_evaluated_ = false;
+    evaluate_present();
+    record_shape();
+  }
+  if (!problem_.touches_obstacle(present_.active)) {
+    onset_ = {};
+  } else if (!began_in_contact_) {
+    onset_ = first_tensions(start);
+    present_evaluated_ = false;
+  }
+  evaluate_present();
+  result_.factorizations = static_cast<int>(newton_.factorizations() - factorizations_before_);
+  if (std::isfinite(problem_.objective())) {
+    write_block(to);
+  } else {  // no robot can have the coordinates in the block
+    if (to != from) std::copy_n(from, layout_.size, to);
+    result_.status = Status::kGaveUp;
+  }
+  return result_;
+}
+
+template <class Model>
+StepResult ModelContinuation<Model>::trace(const double* from, const double* target, double* to,
+                                           std::vector<double>& shapes) {
+  shapes_ = &shapes;
+  const StepResult result = follow(from, target, to);
+  shapes_ = nullptr;
+  return result;
+}
+
+template <class Model>
+Optimality ModelContinuation<Model>::optimality(const double* block) {
+  read_block(block);
+  evaluate_present();
+  Optimality found;
+  const double length = problem_.robot().max_length;
+  for (const auto& g : problem_.gradient())
+    for (const double slope : g.v) found.stationarity = std::max(found.stationarity, std::abs(slope));
+  for (const auto& g : problem_.mount_gradient())
+    found.stationarity = std::max(found.stationarity, length / problem_.robot().segments * norm(g));
+  found.gap = problem_.violation() / length;
+  for (int j = 0; j < present_.active.count; ++j) {
+    const double gap = std::abs(problem_.gaps()[present_.active.contact[j]]);
+    found.gap = std::max(found.gap, gap / length);
+    found.complementarity = std::max(found.complementarity, gap * present_.active.multiplier[j]);
+  }
+  return found;
+}
+
+#define CCR_INSTANTIATE(Model)                                                         \
+  template ModelContinuation<Model>::ModelContinuation(const Robot&, int);             \
+  template Status ModelContinuation<Model>::pursue(const Command&);                    \
+  template StepResult ModelContinuation<Model>::follow(const double*, const double*, double*); \
+  template void ModelContinuation<Model>::evaluate_present();                          \
+  template void ModelContinuation<Model>::accept();                                    \
+  template void ModelContinuation<Model>::record_shape();                              \
+  template void ModelContinuation<Model>::clear_trend();                               \
+  template void ModelContinuation<Model>::extrapolate_trial();                         \
+  template bool ModelContinuation<Model>::pulls_cable(const Command&) const;           \
+  template bool ModelContinuation<Model>::only_releases(const Command&) const;         \
+  template double ModelContinuation<Model>::command_distance(const Command&, const Command&) const;
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
+
+template <>
+std::unique_ptr<Continuation<2>> make_continuation(const Robot& robot, int obstacles) {
+  if (robot.model == ModelKind::kRod) return std::make_unique<ModelContinuation<Planar<RodLaw>>>(robot, obstacles);
+  return std::make_unique<ModelContinuation<Planar<PaperLaw>>>(robot, obstacles);
+}
+
+template <>
+std::unique_ptr<Continuation<3>> make_continuation(const Robot& robot, int obstacles) {
+  return std::make_unique<ModelContinuation<Spatial>>(robot, obstacles);
+}
+
+}  // namespace ccr

@@ -1,0 +1,170 @@
+// The continuation compiled for one model. Its files: block_io (blocks read and written), model_continuation (a branch
+// followed), acceptance (whether a shape continues the branch), passage (whether the robot passed through an obstacle),
+// tension_limit (stalls and yielding motors), descent (what happens after the end of a branch), ramp (whether a pull
+// reaches a force).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "solve/continuation.hpp"
+#include "solve/newton.hpp"
+
+namespace ccr {
+
+// Change of the equilibrium per unit of travel of the command, from which the search for the next one starts. Zero for a
+// free robot, and after a contact came or went.
+template <class Model>
+struct Trend {
+  std::vector<typename Model::Control> controls;
+  std::vector<Position<Model::kSpace>> mounts;
+  std::array<double, tolerances::kMaxActive> multipliers{};  // in the order of the active set
+};
+
+template <class Model>
+class ModelContinuation : public Continuation<Model::kSpace> {
+ public:
+  static constexpr int kSpace = Model::kSpace, kCables = Model::kCables;
+  static constexpr bool kTrend = kCables == 1;  // whether the block keeps the trend for the next step
+  using ContactProblem = ccr::ContactProblem<Model>;
+  using Position = ccr::Position<kSpace>;
+  using Command = ccr::Command<kCables>;
+  using Iterate = ccr::Iterate<Model>;
+  using Control = typename Model::Control;
+  using Frame = typename Model::Frame;
+  using Tensions = Vec<kCables>;
+
+  ModelContinuation(const Robot& robot, int obstacles);
+  ModelContinuation(const ModelContinuation&) = delete;
+
+  const BlockLayout& layout() const override { return layout_; }
+  void set_obstacles(std::span<const Obstacle<kSpace>> obstacles) override;
+  StepResult follow(const double* from, const double* target, double* to) override;
+  StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) override;
+  bool ramp_reaches_force(const Ramp& ramp, double* reached) override;
+  Optimality optimality(const double* block) override;
+
+ private:
+  enum class Move { kAccepted, kRejected, kOverTension };
+  enum class End { kPassed, kSnapped, kStuck, kOverTension };
+
+  // How a command is pursued: the sub-step to try next, and what has happened so far.
+  struct Pursuit;
+
+  // Block I/O.
+  void read_block(const double* block);
+  void read_active_set(const double* block);
+  void read_mounts(const double* displacements, std::vector<Position>& mounts) const;
+  void write_block(double* block);
+  void write_forces(double* block) const;
+  void write_active_set(double* block) const;
+  void write_trend(double* block) const;
+  void write_mounts(const std::vector<Position>& mounts, double* displacements) const;
+
+  // Following a branch.
+  Status pursue(const Command& target);
+  bool advance(Pursuit& pursuit, const Command& goal, double remaining);
+  Command raise_to_pretension(Command wanted) const;
+  Move try_command(const Command& command);
+  void accept();
+  void record_shape();
+  void update_trend();
+  void clear_trend();
+  void extrapolate_trial();
+  void evaluate_present();
+  Tensions first_tensions(const Command& start);
+  double command_distance(const Command& a, const Command& b) const;
+  double travel(const Command& from, const Command& to) const;
+  bool pulls_cable(const Command& command) const;
+  bool only_releases(const Command& command) const;
+  bool work_is_spent() const { return newton_.factorizations() - factorizations_before_ > tolerances::kWork; }
+
+  // Whether a shape continues the branch.
+  bool try_free_shape();
+  bool meets_narrow_obstacle() const;
+  double energy_loss(const Command& command) const;
+  bool left_branch(const Command& command, double moved, double loss);
+  bool follows_trend() const;
+  bool way_back_returns();
+
+  // Whether the robot passed through an obstacle.
+  double largest_motion() const;
+  bool passage_is_clear(double moved) const;
+  bool passage_is_clear(int obstacle, double moved) const;
+
+  // The tension limit.
+  bool is_at_tension_limit() const;
+  bool is_tight() const;
+  bool approach_tension_limit();
+  bool hold_stalled_cables(Command& wanted) const;
+  bool yield_cables(Command& wanted, double least) const;
+  bool is_unyielding() const;
+  bool is_blocked(const Command& command);
+  bool find_holding_set(const Command& command, ActiveSet& holding);
+  void keep_last_held(const Iterate& held);
+
+  // The descent after the end of a branch.
+  End descend_from_end(const Command& command);
+  End finish_descent(bool motor_holds);
+  End undo_descent(End end);
+  bool leave_towards(const Command& command);
+  bool restore_at(const Command& command, bool holding);
+  bool descend_once(bool& moved);
+  bool try_newton();
+  bool trial_is_close() const;
+
+  BlockLayout layout_;
+  Newton<Model> newton_;
+  ContactProblem& problem_ = newton_.problem;
+  Iterate present_, trial_;
+  Trend<Model> trend_;              // at `present_`
+  double energy_ = 0;               // of `present_`
+  Tensions tensions_{}, trial_tensions_{};
+  bool present_evaluated_ = false;  // whether the contact problem is evaluated at `present_`
+
+  StepResult result_;                    // of the step under way
+  std::vector<double>* shapes_ = nullptr;  // receives the accepted shapes of a trace
+  std::int64_t factorizations_before_ = 0;  // of the step
+  Tensions onset_{};                // tensions where the present contact began
+  bool began_in_contact_ = false;   // whether an obstacle was touched where the step began
+  Iterate last_held_;               // the last equilibrium of the step that the motors held, where a later one was not
+  bool was_exceeded_ = false;       // whether there is one
+
+  std::vector<Position> nodes_;  // of the block last read
+  std::vector<Frame> frames_;
+  std::vector<Position> points_, mounts_;  // of the last accepted shape
+  std::vector<Control> predicted_;         // controls of `trial_` along the trend
+  bool has_trend_ = false;
+  Iterate back_;                  // scratch of `way_back_returns`
+  std::vector<Control> unloaded_;  // scratch of `is_blocked`: slope of the energy alone
+  Iterate descent_start_;         // where a descent began, and its points, mounts and recorded shapes
+  std::vector<Position> descent_points_, descent_mounts_;
+  std::size_t descent_trace_ = 0;
+};
+
+// The largest of some numbers.
+template <int C>
+double highest(const Vec<C>& values) {
+  return *std::max_element(values.v.begin(), values.v.end());
+}
+
+// The command a fraction t of the way from one to another.
+template <int C>
+Command<C> between(const Command<C>& a, const Command<C>& b, double t) {
+  Command<C> out;
+  for (int k = 0; k < C; ++k) out.cables[k] = a.cables[k] + t * (b.cables[k] - a.cables[k]);
+  out.length = a.length + t * (b.length - a.length);
+  return out;
+}
+
+// Largest displacement of a cable, in size [mm].
+template <int C>
+double largest_displacement(const Vec<C>& cables) {
+  double largest = 0;
+  for (const double cable : cables.v) largest = std::max(largest, std::abs(cable));
+  return largest;
+}
+
+}  // namespace ccr

@@ -1,0 +1,156 @@
+// The limit of the cable tensions: stalls, motors that yield, and places that are blocked whatever the tension.
+#include <algorithm>
+#include <cmath>
+
+#include "model/models.hpp"
+#include "solve/model_continuation.hpp"
+
+namespace ccr {
+
+using namespace tolerances;
+
+template <class Model>
+bool ModelContinuation<Model>::is_at_tension_limit() const {
+  return highest(tensions_) >= problem_.robot().max_tension * (1 - kTensionBand);
+}
+
+// Whether a tension exceeds by far what the robot needs to bend: geometry begins to block it, ever more closely.
+template <class Model>
+bool ModelContinuation<Model>::is_tight() const {
+  const Robot& robot = problem_.robot();
+  return highest(tensions_) > kTight * robot.rigidity / (robot.offset * robot.max_length);
+}
+
+template <class Model>
+void ModelContinuation<Model>::keep_last_held(const Iterate& held) {
+  last_held_ = held;
+  was_exceeded_ = true;
+}
+
+// `present_` is below the tension limit, `trial_` above: closes in from below by false position (Illinois), aiming into
+// the middle of the accepted band. False where the branch cannot be followed that far.
+template <class Model>
+bool ModelContinuation<Model>::approach_tension_limit() {
+  const double aim = problem_.robot().max_tension * (1 - kTensionBand / 2);
+  const Command start = present_.command, end = trial_.command;
+  const double span = command_distance(start, end);
+  double low = 0, high = 1;  // fractions of the way
+  double excess = highest(trial_tensions_) - aim, shortage = highest(tensions_) - aim;
+  Move last = Move::kRejected;
+  for (int i = 0; i < kStallIterations && !is_at_tension_limit(); ++i) {
+    const double width = high - low;
+    if (!(width * span > kCommandResolution)) break;
+    const double middle = std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
+    const Move move = try_command(between(start, end, middle));
+    if (move == Move::kRejected) return false;
+    if (move == Move::kAccepted) {
+      accept();
+      low = middle;
+      shortage = highest(tensions_) - aim;
+      if (move == last) excess /= 2;
+    } else {
+      high = middle;
+      excess = highest(trial_tensions_) - aim;
+      if (move == last) shortage /= 2;
+    }
+    last = move;
+  }
+  return true;
+}
+
+// Gives up pulling the cables whose tension is at the limit, or else all that are pulled. False where there is one cable.
+template <class Model>
+bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
+  if (kCables == 1) return false;
+  const auto give_up = [&](double tension) {
+    bool held = false;
+    for (int k = 0; k < kCables; ++k) {
+      const double present = present_.command.cables[k];
+      if (tensions_[k] < tension || std::abs(wanted.cables[k]) <= std::abs(present)) continue;
+      wanted.cables[k] = present;
+      held = true;
+    }
+    return held;
+  };
+  return give_up(problem_.robot().max_tension * (1 - kTensionBand)) || give_up(-HUGE_VAL);
+}
+
+// Lets out, by at least so much, the cables whose motors cannot hold them. False where the command lets them out farther.
+template <class Model>
+bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const {
+  const Robot& robot = problem_.robot();
+  bool changed = false;
+  for (int k = 0; k < kCables; ++k) {
+    const double present = present_.command.cables[k];
+    const double held = std::max(std::abs(present) - least * robot.offset, 0.0);
+    if (tensions_[k] <= robot.max_tension || present == 0 || wanted.cables[k] / present <= held / std::abs(present)) continue;
+    wanted.cables[k] = std::copysign(held, present);
+    changed = true;
+  }
+  return changed;
+}
+
+// Whether a cable that its motor cannot hold has nothing more to let out.
+template <class Model>
+bool ModelContinuation<Model>::is_unyielding() const {
+  for (int k = 0; k < kCables; ++k)
+    if (tensions_[k] > problem_.robot().max_tension && present_.command.cables[k] == 0) return true;
+  return false;
+}
+
+// The active set at `present_`; where that is empty, the gap that is violated most under a command, with a multiplier of
+// one. False where there is none.
+template <class Model>
+bool ModelContinuation<Model>::find_holding_set(const Command& command, ActiveSet& holding) {
+  holding = present_.active;
+  if (holding.count > 0) return true;
+  present_evaluated_ = false;
+  trial_ = present_;
+  trial_.command = command;
+  if (!problem_.evaluate(trial_)) return false;
+  for (const int contact : problem_.near_contacts())
+    if (problem_.gaps()[contact] < (holding.count == 0 ? 0.0 : problem_.gaps()[holding.contact[0]])) {
+      holding.count = 1;
+      holding.contact[0] = contact;
+      holding.multiplier[0] = 1;
+    }
+  return holding.count > 0;
+}
+
+// Whether to first order no motion meets a command and all gaps: the multipliers of the holding set balance each other
+// without the slope of the energy, Σ λ ∇c = 0, as they do where the tension grows beyond bounds.
+template <class Model>
+bool ModelContinuation<Model>::is_blocked(const Command& command) {
+  const Robot& robot = problem_.robot();
+  if (present_.active.count > 0 && !is_tight() && std::isfinite(robot.max_tension)) return false;
+  ActiveSet holding;
+  if (!find_holding_set(command, holding)) return false;
+  present_evaluated_ = false;
+  if (!problem_.evaluate(present_)) return false;
+  double pressed = 0, balance = 0;
+  for (int j = 0; j < holding.count; ++j)
+    pressed = std::max(pressed, holding.multiplier[j] * problem_.lever_arm(holding.contact[j]));
+  problem_.reduced_gradient({});
+  unloaded_ = problem_.gradient();
+  problem_.reduced_gradient(holding);
+  for (std::size_t i = 0; i < unloaded_.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k)
+      balance = std::max(balance, std::abs(problem_.gradient()[i][k] - unloaded_[i][k]));
+  for (std::size_t m = 0; m < present_.mounts.size(); ++m)
+    balance = std::max(balance, robot.max_length / robot.segments * norm(problem_.mount_load(holding, static_cast<int>(m))));
+  return balance <= kBarred * pressed;
+}
+
+#define CCR_INSTANTIATE(Model)                                                            \
+  template bool ModelContinuation<Model>::is_at_tension_limit() const;                    \
+  template bool ModelContinuation<Model>::is_tight() const;                               \
+  template void ModelContinuation<Model>::keep_last_held(const Iterate&);                 \
+  template bool ModelContinuation<Model>::approach_tension_limit();                       \
+  template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;            \
+  template bool ModelContinuation<Model>::yield_cables(Command&, double) const;           \
+  template bool ModelContinuation<Model>::is_unyielding() const;                          \
+  template bool ModelContinuation<Model>::is_blocked(const Command&);
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
+
+}  // namespace ccr
