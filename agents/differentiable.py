@@ -53,7 +53,7 @@ def _followed(equilibrium: Equilibrium, row: int, value: float) -> bool:
 
 
 def _determined(equilibrium: Equilibrium) -> bool:
-    return equilibrium.cable_mm > 0 or equilibrium.robot.cable == "sliding"
+    return equilibrium.cable_mm > 0 or equilibrium.robot.model == "rod"
 
 
 def differentiable(

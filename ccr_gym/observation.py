@@ -39,7 +39,7 @@ class Observer:
         told = {"desired_force": goal, "force_error": goal, "force_est": space}
         if task.moving:
             told["desired_ahead"] = len(AHEAD)
-        if settings.senses:
+        if settings.sensors:
             told["force_measured"] = space
         if body.obstacle_size:
             told["obstacle"] = body.obstacle_size

@@ -82,7 +82,7 @@ class BaseBatch(ABC):
         self.factorizations = np.zeros(self.count, np.int64)
         self._scenes: list[Scene | None] = [None] * self.count
         self.commands = np.zeros((self.count, self.model.cables + 1))
-        self._fleet = self._make_fleet(obstacles, threads)
+        self._kernel_batch = self._make_kernel(obstacles, threads)
         self._all = list(range(self.count))
         self._turn = _Turn()
         self._clear: Scene | None = None  # the scene last found to leave the straight robot clear
@@ -99,7 +99,7 @@ class BaseBatch(ABC):
         """The layout of a block."""
 
     @abstractmethod
-    def _make_fleet(self, obstacles: int, threads: int) -> Any:
+    def _make_kernel(self, obstacles: int, threads: int) -> Any:
         """The robots in the kernel."""
 
     @abstractmethod
@@ -139,7 +139,7 @@ class BaseBatch(ABC):
             check_clear(self.robot, scene, self._straight_gaps(scene))
         compiled = self._kernel_scene(scene)
         with self._turn:
-            self._fleet.assign(index, compiled)
+            self._kernel_batch.assign(index, compiled)
             self._scenes[index] = scene
             self._unrested.add(index)
 
@@ -227,7 +227,7 @@ class BaseBatch(ABC):
             self._check_rested(self._all)
             self._check_lengths(self._all)
             blocks, scratch = self.blocks.copy(), [np.zeros(self.count, np.int64) for _ in range(3)]
-            self._fleet.step(self._all, commands, blocks, *scratch)
+            self._kernel_batch.step(self._all, commands, blocks, *scratch)
         return blocks
 
     def optimality(self) -> np.ndarray:
@@ -239,10 +239,10 @@ class BaseBatch(ABC):
         found = np.zeros((self.count, 3))
         with self._turn:
             self._check_rested(self._all)
-            self._fleet.optimality(self.blocks, found)
+            self._kernel_batch.optimality(self.blocks, found)
         return found
 
-    def reaches(
+    def ramp_reaches_force(
         self,
         robots: Sequence[int],
         forces: np.ndarray,
@@ -284,7 +284,7 @@ class BaseBatch(ABC):
         reached = np.zeros((count, self.model.space))
         length = self.robot.length_mm
         with self._turn:
-            found = self._fleet.reaches(which, forces, target, given, increment, limit, length, reached)
+            found = self._kernel_batch.reaches(which, forces, target, given, increment, limit, length, reached)
         return np.array(found, bool), reached
 
     def scene(self, index: int) -> Scene:
@@ -352,7 +352,7 @@ class BaseBatch(ABC):
         return touching_gaps(self.robot, scene, self._straight)
 
     def _move(self, robots: list[int]) -> None:
-        self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
+        self._kernel_batch.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
 
 
 def _check_memory(count: int, size: int) -> None:
@@ -383,7 +383,7 @@ class BatchSolver(BaseBatch):
     def _make_layout(self, obstacles: int) -> Layout:
         return layout(self.robot, obstacles)
 
-    def _make_fleet(self, obstacles: int, threads: int) -> _kernel.Fleet:
+    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.Fleet:
         return _kernel.Fleet(kernel_robot(self.robot), self.count, obstacles, threads)
 
     def _kernel_scene(self, scene: Scene) -> _kernel.Scene:
@@ -396,7 +396,7 @@ class BatchSolver(BaseBatch):
 class ReferenceBatch(BatchSolver):
     """The same robots moved by :class:`solver.ReferenceSolver`, one after the other and slowly.
 
-    Trial pulls of :meth:`reaches` are the kernel's.
+    Trial pulls of :meth:`ramp_reaches_force` are the kernel's.
     """
 
     def _move(self, robots: list[int]) -> None:

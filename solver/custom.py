@@ -207,7 +207,7 @@ class Custom(Obstacle):
         return np.asarray(self.center + points @ np.array([[x, y], [-y, x]]))
 
     def _radii(self) -> list[tuple[str, float]]:
-        return [("reach", self.reach), ("the sharpest radius", self.extent.fineness)]
+        return [("reach", self.reach), ("the sharpest radius", self.extent.min_curvature_radius)]
 
     def _values(self, points: np.ndarray) -> np.ndarray:
         """The family's function at points from the centre, ``(k, 2) → (k,)``."""

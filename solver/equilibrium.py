@@ -129,12 +129,12 @@ class BaseEquilibrium(ABC):
     @property
     def energy(self) -> float:
         """Elastic energy of the robot and of the springs that obstacles are mounted on [N·mm]."""
-        springs = [obstacle.stiffness_matrix for obstacle in self.scene]
+        springs = [obstacle.spring_matrix for obstacle in self.scene]
         moved = zip(self.displacements, springs, strict=True)
-        return self.stiffness * self.objective + sum(float(d @ spring @ d) / 2 for d, spring in moved)
+        return self.energy_scale * self.objective + sum(float(d @ spring @ d) / 2 for d, spring in moved)
 
     @property
-    def stiffness(self) -> float:
+    def energy_scale(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective J into energy."""
         return float(self.robot.rigidity * self.robot.segments / (2 * self.length_mm))
 
@@ -170,7 +170,7 @@ class BaseEquilibrium(ABC):
         return self.multipliers > 0
 
     @property
-    def pushes(self) -> np.ndarray:
+    def inequality_multipliers(self) -> np.ndarray:
         """Multipliers of the inequalities of the node-coordinate problem, ``(k,)`` [rad²/mm]."""
         return self.multipliers[:, :, 1:].ravel()
 
@@ -200,7 +200,7 @@ class BaseEquilibrium(ABC):
         """
         unknowns, parameters = self._node_point()
         balance, equality_slopes = self._balance(self._node_derivatives(unknowns, parameters))
-        return unknowns, parameters, _tensions(balance, equality_slopes), self.pushes
+        return unknowns, parameters, _tensions(balance, equality_slopes), self.inequality_multipliers
 
     def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
         return [value.full() for value in self._derivatives(unknowns, parameters)]
@@ -208,8 +208,10 @@ class BaseEquilibrium(ABC):
     def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Slope of the objective less the contact forces, and the slopes of the equalities that balance it."""
         slope, _, equality_slopes, _, gap_slopes = derivatives
-        pushes = self.pushes
-        return slope.ravel() - (gap_slopes.T @ pushes if pushes.size else 0.0), equality_slopes
+        inequality_multipliers = self.inequality_multipliers
+        return slope.ravel() - (
+            gap_slopes.T @ inequality_multipliers if inequality_multipliers.size else 0.0
+        ), equality_slopes
 
     def residuals(self) -> Residuals:
         """Recompute the optimality conditions of eq. 5 or 13 from the nodes and multipliers alone.
@@ -220,16 +222,16 @@ class BaseEquilibrium(ABC):
         derivatives = self._node_derivatives(*self._node_point())
         _, lengths, _, gaps, _ = derivatives
         balance, equality_slopes = self._balance(derivatives)
-        tensions, pushes = _tensions(balance, equality_slopes), self.pushes
+        tensions, inequality_multipliers = _tensions(balance, equality_slopes), self.inequality_multipliers
         touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
-        touchable = np.concatenate([np.ones(pushes.size - touchable.size, bool), touchable])
+        touchable = np.concatenate([np.ones(inequality_multipliers.size - touchable.size, bool), touchable])
         clearance = gaps.ravel()[touchable]
         return Residuals(
             stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
             lengths=float(np.abs(lengths).max()),
             gaps=float(max(0.0, -clearance.min(initial=0.0))),
-            complementarity=float(np.abs(pushes[touchable] * clearance).max(initial=0.0)),
-            sign=float(max(0.0, -pushes.min(initial=0.0))),
+            complementarity=float(np.abs(inequality_multipliers[touchable] * clearance).max(initial=0.0)),
+            sign=float(max(0.0, -inequality_multipliers.min(initial=0.0))),
         )
 
 
@@ -264,7 +266,7 @@ class Equilibrium(BaseEquilibrium):
     def shear(self) -> np.ndarray:
         """Shear angle ψ of each segment, ``(n,)`` [rad]; zero with a sliding cable."""
         sines = self._layout.coordinates(self.block)
-        return np.zeros_like(sines) if self.robot.cable == "sliding" else np.asarray(np.arcsin(sines))
+        return np.zeros_like(sines) if self.robot.model == "rod" else np.asarray(np.arcsin(sines))
 
     @property
     def nodes(self) -> np.ndarray:
@@ -287,14 +289,14 @@ class Equilibrium(BaseEquilibrium):
         return touching_points(self.robot, self.nodes)
 
     @property
-    def pushes(self) -> np.ndarray:
+    def inequality_multipliers(self) -> np.ndarray:
         """Multipliers of the inequalities of :func:`solver.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
         multipliers = self.multipliers[:, :, 1:].ravel()
-        if self.robot.cable != "sliding":
+        if self.robot.model != "rod":
             return multipliers
         disks = self.disk_multipliers
         return np.concatenate(
-            [[self.tension / self.stiffness], np.maximum(disks, 0), np.maximum(-disks, 0), multipliers]
+            [[self.tension / self.energy_scale], np.maximum(disks, 0), np.maximum(-disks, 0), multipliers]
         )
 
     @property

@@ -284,7 +284,7 @@ def node_problem(
     pull, total, offset = parameters[0], parameters[1], parameters[2]
     if change is not None:
         pull, total = pull + change[0], total + change[1]
-    stiffness = parameters[3] * segments / (2 * total)
+    energy_scale = parameters[3] * segments / (2 * total)
     backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(unknowns[: 2 * segments], 2, segments))
     cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments : 4 * segments], 2, segments))
     disk = cable - backbone
@@ -292,7 +292,7 @@ def node_problem(
     turned = before[0, :] * after[1, :] - before[1, :] * after[0, :]
     angle = ca.atan2(turned, ca.sum1(before * after))
     chords, cables = norms(backbone[:, 1:] - backbone[:, :-1]), norms(cable[:, 1:] - cable[:, :-1])
-    if robot.cable == "sliding":
+    if robot.model == "rod":
         sinc, _ = sinc_and_cosine(angle**2 / 4)
         astride = ca.sum1((backbone[:, 1:] - backbone[:, :-1]) * (before + after)) / (2 * offset)
         equalities = ca.horzcat(chords - total / segments * sinc, astride, norms(after) - offset)
@@ -318,7 +318,7 @@ def node_problem(
         if mounted[j]:
             mount = sum(mounted[:j])
             moved, (xx, xy, yy) = displacements[:, mount], ca.vertsplit(springs[:, mount])
-            energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * stiffness)
+            energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * energy_scale)
             shift = shift + moved
         for line in robot.touch:
             points = divided(lines[line], robot.between)[:, 1:]
@@ -328,7 +328,7 @@ def node_problem(
 
 def limits(robot: "Robot") -> int:
     """How many inequalities a robot's node problem has before the gaps to obstacles."""
-    return 1 + 2 * robot.segments if robot.cable == "sliding" else 0
+    return 1 + 2 * robot.segments if robot.model == "rod" else 0
 
 
 def _disk_gaps(robot: "Robot", backbone: ca.MX, disk: ca.MX, ahead: ca.MX) -> list[ca.MX]:
@@ -399,8 +399,8 @@ def second_derivatives(problem: NodeProblem, change: ca.MX) -> ca.Function:
     multipliers stands in ``F_v`` already.
     """
     _, _, objective, equalities, inequalities = problem
-    tensions, pushes = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("pushes", inequalities.shape[0])
-    lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(pushes, inequalities)
+    tensions, multipliers = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("multipliers", inequalities.shape[0])
+    lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(multipliers, inequalities)
     loads = ca.gradient(lagrangian, change)
     conditions = ca.vertcat(ca.gradient(lagrangian, problem.unknowns), equalities, inequalities)
     outputs = [
@@ -410,5 +410,5 @@ def second_derivatives(problem: NodeProblem, change: ca.MX) -> ca.Function:
         ca.jacobian(loads, change),
     ]
     outputs = [ca.substitute(output, change, ca.MX.zeros(change.shape)) for output in outputs]
-    inputs = [problem.unknowns, problem.parameters, tensions, pushes]
+    inputs = [problem.unknowns, problem.parameters, tensions, multipliers]
     return ca.Function("kkt_derivatives", inputs, outputs).expand()  # to scalars, which are faster to evaluate

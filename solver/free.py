@@ -88,7 +88,7 @@ def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
 def free_tension(robot: Robot, cable_mm: float) -> float:
     """Cable tension, ``B dJ/dl`` [N]."""
     segment = _segment(robot, cable_mm)
-    return 2 * robot.stiffness * robot.segments * segment.angle * segment.turn
+    return 2 * robot.energy_scale * robot.segments * segment.angle * segment.turn
 
 
 def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
@@ -117,7 +117,7 @@ def _node(robot: Robot, node: int) -> int:
 def _segment(robot: Robot, cable_mm: float) -> _Segment:
     cable_mm = _cable(robot, cable_mm)
     pull, length, offset = cable_mm / robot.segments, robot.segment_mm, robot.offset_mm
-    if robot.cable == "uniform":  # its shear vanishes
+    if robot.model == "paper":  # its shear vanishes
         turn = 1 / np.sqrt((robot.segments * offset) ** 2 - cable_mm**2 / 4)
         return _Segment(float(2 * np.arcsin(pull / (2 * offset))), length, float(turn), 0.0)
     angle = pull / offset

@@ -91,5 +91,5 @@ def make_layout(model: Model, segments: int, lines: int, positions: int, obstacl
 
 def layout(robot: Robot, obstacles: int) -> Layout:
     """The layout for a robot among a number of obstacles."""
-    model = SLIDING if robot.cable == "sliding" else PLANE
+    model = SLIDING if robot.model == "rod" else PLANE
     return make_layout(model, robot.segments, len(robot.touch), robot.positions, obstacles)

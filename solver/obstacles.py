@@ -40,13 +40,13 @@ class Extent(NamedTuple):
         center: Centre of a disc or ball that holds it [mm].
         radius: Radius of that disc [mm]; infinite for a wall.
         inradius: Radius of the largest disc or ball inside it [mm]; infinite for a wall.
-        fineness: Smallest radius of curvature of the surface [mm]; infinite for a wall.
+        min_curvature_radius: Smallest radius of curvature of the surface [mm]; infinite for a wall.
     """
 
     center: Point
     radius: float
     inradius: float
-    fineness: float
+    min_curvature_radius: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,11 +55,11 @@ class Obstacle(ABC):
 
     Attributes:
         nodes: Node indices (base = 0) that can touch it; ``None`` for all.
-        stiffness: Of the spring it is mounted on, which lets it shift but not turn [N/mm]: one number, or a symmetric
-            matrix, in the plane ``((kxx, kxy), (kxy, kyy))``, kept as that. ``None`` for a fixed obstacle.
+        spring: Stiffness of the spring it is mounted on, which lets it shift but not turn [N/mm]: one number, or a
+            symmetric matrix, in the plane ``((kxx, kxy), (kxy, kyy))``, kept as that. ``None`` for a fixed obstacle.
 
     Raises:
-        ValueError: If a node index is negative or repeated, or the stiffness is not positive definite.
+        ValueError: If a node index is negative or repeated, or the spring's stiffness is not positive definite.
     """
 
     space: ClassVar[int] = 2  # dimension of its points
@@ -67,11 +67,11 @@ class Obstacle(ABC):
     lengths: ClassVar[tuple[str, ...]] = ("radius",)  # fields that are radii or sizes
 
     nodes: tuple[int, ...] | None = None
-    stiffness: float | Matrix | None = None
+    spring: float | Matrix | None = None
 
     def __post_init__(self) -> None:
-        if self.stiffness is not None:
-            object.__setattr__(self, "stiffness", spring("stiffness", self.stiffness, self.space))
+        if self.spring is not None:
+            object.__setattr__(self, "spring", spring("spring", self.spring, self.space))
         if self.nodes is not None:
             object.__setattr__(self, "nodes", _nodes(self.nodes))
         for name in self.places:
@@ -90,9 +90,9 @@ class Obstacle(ABC):
         return self.law.kind
 
     @property
-    def stiffness_matrix(self) -> np.ndarray:
-        """``stiffness`` as an array ``(2, 2)``, in space ``(3, 3)`` [N/mm], zero for a fixed obstacle."""
-        return np.zeros((self.space, self.space)) if self.stiffness is None else np.array(self.stiffness)
+    def spring_matrix(self) -> np.ndarray:
+        """``spring`` as an array ``(2, 2)``, in space ``(3, 3)`` [N/mm], zero for a fixed obstacle."""
+        return np.zeros((self.space, self.space)) if self.spring is None else np.array(self.spring)
 
     @property
     @abstractmethod

@@ -95,7 +95,7 @@ class ReferenceSolver:
         self.scene = scene
         self._touchable = touchable_points(robot, scene)
         check_core(robot, scene)
-        self._sliding = robot.cable == "sliding"
+        self._sliding = robot.model == "rod"
         self._limits = limits(robot)
         self._build()
         self._rest = self._equilibrium(self._free(0.0, robot.length_mm), Status.CONVERGED, 0)
@@ -197,23 +197,23 @@ class ReferenceSolver:
         angle = free_angle(robot, cable) if self._sliding else 0.0
         straight = np.zeros(2 * sum(self.scene.mounted))
         unknowns = np.r_[self._shape(cable, length, np.full(robot.segments, angle)), straight]
-        pushes = np.zeros(self._limits + self._touchable[:, :, 1:].size)
+        multipliers = np.zeros(self._limits + self._touchable[:, :, 1:].size)
         if self._sliding:
-            pushes[0] = free_tension(robot, cable) / robot.stiffness
-        return self._balanced(cable, length, unknowns, pushes)
+            multipliers[0] = free_tension(robot, cable) / robot.energy_scale
+        return self._balanced(cable, length, unknowns, multipliers)
 
-    def _balanced(self, cable: float, length: float, unknowns: np.ndarray, pushes: np.ndarray) -> _Point:
+    def _balanced(self, cable: float, length: float, unknowns: np.ndarray, multipliers: np.ndarray) -> _Point:
         """A shape with multipliers of its inequalities, and those of the equalities by least squares."""
         derivatives = node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
         values = derivatives(unknowns, self._parameters(cable, length))
         slope, _, equality_slopes, _, gap_slopes = (value.full() for value in values)
-        balance = gap_slopes.T @ pushes - slope.ravel()
+        balance = gap_slopes.T @ multipliers - slope.ravel()
         tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
-        return _Point(cable, length, unknowns, np.concatenate([tensions, -pushes]))
+        return _Point(cable, length, unknowns, np.concatenate([tensions, -multipliers]))
 
     def _start(self, equilibrium: Equilibrium) -> _Point:
-        unknowns, _, tensions, pushes = equilibrium.node_solution()
-        return _Point(equilibrium.cable_mm, equilibrium.length_mm, unknowns, -np.concatenate([tensions, pushes]))
+        unknowns, _, tensions, multipliers = equilibrium.node_solution()
+        return _Point(equilibrium.cable_mm, equilibrium.length_mm, unknowns, -np.concatenate([tensions, multipliers]))
 
     def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
         """The solution under another command, ``None`` where IPOPT does not converge to it or leaves the branch."""
@@ -309,8 +309,8 @@ class ReferenceSolver:
         points = touching_points(self.robot, nodes)
         for j, obstacle in enumerate(self.scene):
             normals = obstacle.normal_at(points - displacements[j])
-            stiffness = self.robot.at(point.length).stiffness
-            places.forces(block)[j] = stiffness * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
+            energy_scale = self.robot.at(point.length).energy_scale
+            places.forces(block)[j] = energy_scale * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
         places.force(block)[:] = places.forces(block).sum(axis=0)
         places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
         places.flags(block)[:] = (multipliers > 0).any(axis=0).ravel()

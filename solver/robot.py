@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from solver.validation import SMALLEST, number, positive, sequence, shown, whole
 
 LINES = ("backbone", "cable", "rim")
-CABLES = ("uniform", "sliding")
+MODELS = ("paper", "rod")
 ANGLES = 64  # at which the longest edge of a bent segment is looked for
 RIGIDITIES = (1e-60, 1e60)  # that leave EI/L² and EI/2l0, and the squares of forces, normal numbers [N·mm²]
 OFFSETS = (1e-4, 10.0)  # over the longest length: nearer ones leave too few digits of a cable's share
@@ -31,8 +31,8 @@ class Robot:
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tension, never the shape.
         max_tension: Cable tension the motor can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, half a turn of the tip.
-        cable: ``"uniform"``, the paper's: every segment takes an equal share of the cable displacement and shears.
-            ``"sliding"``: the cable slides through the disks without friction and can go slack, and segments are arcs
+        model: ``"paper"``, the paper's: every segment takes an equal share of the cable displacement and shears.
+            ``"rod"``: the cable slides through the disks without friction and can go slack, and segments are arcs
             (Rao 2024); with more segments this robot tends to the elastica under a tendon of constant tension.
         length_range_mm: Shortest and longest length the base can insert [mm]; ``None`` for a robot of fixed length.
         touch: The lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and
@@ -52,7 +52,7 @@ class Robot:
     rigidity: float = 5000.0
     max_tension: float = 15.0
     max_cable_mm: float | None = None
-    cable: str = "uniform"
+    model: Literal["paper", "rod"] = "paper"
     length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0
@@ -61,8 +61,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         check_numbers(self, LINES)
-        if not (isinstance(self.cable, str) and self.cable in CABLES):
-            raise ValueError(f"cable is {shown(self.cable)}; it must be one of {', '.join(CABLES)}")
+        if not (isinstance(self.model, str) and self.model in MODELS):
+            raise ValueError(f"model is {shown(self.model)}; it must be one of {', '.join(MODELS)}")
         self._check_lengths()
         shortest, longest = self.lengths_mm
         check_scale(self, longest)
@@ -175,7 +175,7 @@ class Robot:
         return _longest_edges(self)
 
     @property
-    def stiffness(self) -> float:
+    def energy_scale(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective J = Σθ² [rad²] into energy."""
         return self.rigidity / (2 * self.segment_mm)
 
@@ -189,7 +189,7 @@ class Robot:
 @lru_cache(maxsize=64)
 def _longest_edges(robot: Robot) -> tuple[float, ...]:
     segment = robot.longest_mm / robot.segments
-    if robot.cable == "sliding":
+    if robot.model == "rod":
         assert robot.disk_radius_mm is not None
         widest = min((segment - robot.disk_thickness_mm) / robot.disk_radius_mm, math.pi)
         angles = [widest * k / ANGLES for k in range(1, ANGLES + 1)]

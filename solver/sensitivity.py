@@ -69,14 +69,14 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     """
     instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
     robot, scene = equilibrium.robot, equilibrium.scene
-    sliding = robot.cable == "sliding"
+    sliding = robot.model == "rod"
     if not sliding and not equilibrium.cable_mm > 0:
         raise ValueError(f"cable_mm is {equilibrium.cable_mm}; it must be positive, for the shear to be determined")
     kkt = kkt_derivatives(robot, scene.laws, scene.mounted)
-    held = equilibrium.pushes[: limits(robot)] > 0  # a taut cable, and disks that meet
+    held = equilibrium.inequality_multipliers[: limits(robot)] > 0  # a taut cable, and disks that meet
     change = respond(equilibrium, kkt, active, held.tolist())
     load_changes = change.loads
-    load_changes[LENGTH] -= change.load / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
+    load_changes[LENGTH] -= change.load / equilibrium.length_mm  # of the energy scale, EI·n / 2 L0
     for rows in (change.unknowns, change.multipliers, load_changes):
         _turn_about_centres(equilibrium, rows)
     forces = load_changes[:, 2:].reshape(len(load_changes), len(scene), 4)[:, :, :2]
@@ -86,8 +86,8 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     return Sensitivity(
         nodes=_node_slopes(equilibrium, change.unknowns[:, : 4 * robot.segments]),
         multipliers=change.multipliers,
-        tension=equilibrium.stiffness * load_changes[:, CABLE],
-        forces=equilibrium.stiffness * forces,
+        tension=equilibrium.energy_scale * load_changes[:, CABLE],
+        forces=equilibrium.energy_scale * forces,
         displacements=displacements,
     )
 

@@ -131,7 +131,7 @@ class Solver:
 def kernel_robot(robot: Robot) -> _kernel.Robot:
     """A robot as the kernel takes it."""
     return _kernel.Robot(
-        sliding=robot.cable == "sliding",
+        sliding=robot.model == "rod",
         segments=robot.segments,
         offset=robot.offset_mm,
         angle=0.0,
@@ -170,9 +170,9 @@ def scene_arrays(robot: AnyRobot, scene: Scene) -> SceneArrays:
     return (
         [SHAPES[obstacle.kind] for obstacle in scene],
         np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
-        np.array([(*e.center, e.radius, e.fineness, e.inradius) for e in extents], dtype=float),
+        np.array([(*e.center, e.radius, e.min_curvature_radius, e.inradius) for e in extents], dtype=float),
         touchable_points(robot, scene).reshape(len(scene), len(robot.lines_mm) * robot.positions),
-        np.array([obstacle.stiffness_matrix for obstacle in scene], dtype=float),
+        np.array([obstacle.spring_matrix for obstacle in scene], dtype=float),
         [law_address(law) if law.kind == "custom" else 0 for law in scene.laws],
         [np.ascontiguousarray(obstacle.surface) for obstacle in scene],
     )
@@ -221,16 +221,16 @@ def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None
             names = ("the plane", "solver.spatial") if model.space == 3 else ("space", "solver")
             raise ValueError(f"{shown(obstacle)} is an obstacle of {names[0]}; give one of {names[1]}")
         obstacle.check_proportion(robot.longest_mm)
-        if obstacle.stiffness is not None:
-            _check_spring(robot, obstacle.stiffness_matrix)
+        if obstacle.spring is not None:
+            _check_spring(robot, obstacle.spring_matrix)
 
 
-def _check_spring(robot: AnyRobot, stiffness: np.ndarray) -> None:
+def _check_spring(robot: AnyRobot, spring: np.ndarray) -> None:
     low, high = (ratio * robot.rigidity / robot.longest_mm**3 for ratio in SPRINGS)
-    least, *_, most = np.linalg.eigvalsh(stiffness)
+    least, *_, most = np.linalg.eigvalsh(spring)
     if not low <= least <= most <= high:
         raise ValueError(
-            f"stiffness is from {least:.6g} to {most:.6g} N/mm; it must be from {low:.6g} to {high:.6g} N/mm, "
+            f"spring is from {least:.6g} to {most:.6g} N/mm; it must be from {low:.6g} to {high:.6g} N/mm, "
             f"{SPRINGS[0]:g} to {SPRINGS[1]:g} of the robot's EI/L³: leave out a softer obstacle, fix a stiffer one"
         )
 

@@ -141,6 +141,6 @@ class SpatialRobot:
         return tuple(((segment + stretched) / (self.between + 1)).tolist())
 
     @property
-    def stiffness(self) -> float:
+    def energy_scale(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective [rad²] into energy."""
         return self.rigidity / (2 * self.segment_mm)

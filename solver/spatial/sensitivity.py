@@ -72,7 +72,7 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
         raise ValueError("cables_mm is (0, 0); one must be pulled, for the shear to be determined")
     change = respond(equilibrium, _kkt_derivatives(robot, scene.laws, scene.mounted), active, [])
     loads = change.loads
-    loads[LENGTH] -= change.load / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
+    loads[LENGTH] -= change.load / equilibrium.length_mm  # of the energy scale, EI·n / 2 L0
     for slopes in (change.unknowns, change.multipliers, loads):
         for j, obstacle in enumerate(scene):
             shifts, turns = np.split(slopes[obstacle_rows(j)][:6], 2)
@@ -88,8 +88,8 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
         nodes=nodes[0],
         turns=_turns(equilibrium, nodes[1:] - nodes[0], pulled),
         multipliers=change.multipliers,
-        tensions=equilibrium.stiffness * pulled * loads[:, CABLES],
-        forces=equilibrium.stiffness * forces,
+        tensions=equilibrium.energy_scale * pulled * loads[:, CABLES],
+        forces=equilibrium.energy_scale * forces,
         displacements=displacements,
     )
 

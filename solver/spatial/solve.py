@@ -107,7 +107,7 @@ class SpatialBatchSolver(BaseBatch):
     def _make_layout(self, obstacles: int) -> Layout:
         return spatial_layout(self.robot, obstacles)
 
-    def _make_fleet(self, obstacles: int, threads: int) -> _kernel.SpatialFleet:
+    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialFleet:
         return _kernel.SpatialFleet(kernel_robot(self.robot), self.count, obstacles, threads)
 
     def _kernel_scene(self, scene: Scene) -> _kernel.SpatialScene:

@@ -35,12 +35,12 @@ def test_gradients(solver):
 
 
 def test_gradients_in_every_command_and_the_place_of_an_obstacle():
-    robot = Robot(length_mm=180, segments=18, offset_mm=8, cable="sliding", length_range_mm=(170, 190))
+    robot = Robot(length_mm=180, segments=18, offset_mm=8, model="rod", length_range_mm=(170, 190))
     rows = (CABLE, LENGTH, obstacle_rows(0).start)
 
     def solved(values):
         cable, length, x = values.tolist()
-        solver = Solver(robot, Scene([Circle(center=(x, 104), radius=15, stiffness=1.0)]))
+        solver = Solver(robot, Scene([Circle(center=(x, 104), radius=15, spring=1.0)]))
         equilibrium = solver.rest()
         for part in range(1, 11):
             equilibrium = solver.step(equilibrium, cable * part / 10, 180 + (length - 180) * part / 10)

@@ -25,7 +25,7 @@ def make_robot(radius, thickness):
         length_mm=180,
         segments=12,
         offset_mm=8,
-        cable="sliding",
+        model="rod",
         max_tension=1000,
         between=2,
         disk_radius_mm=radius,
@@ -161,4 +161,4 @@ def test_a_cable_that_shears_its_segments_has_no_disks_that_meet():
 @pytest.mark.parametrize(("field", "value"), [("disk_radius_mm", 0.0), ("disk_thickness_mm", 9.5)])
 def test_disks_that_cannot_be(field, value):
     with pytest.raises(ValueError, match=rf"{field} is {value}; it must be from"):
-        Robot(length_mm=180, segments=18, offset_mm=8, cable="sliding", **{field: value})
+        Robot(length_mm=180, segments=18, offset_mm=8, model="rod", **{field: value})

@@ -71,7 +71,7 @@ def pulled(segments, cable_mm, *walls_mm):
         offset_mm=OFFSET,
         rigidity=RIGIDITY,
         max_tension=math.inf,
-        cable="sliding",
+        model="rod",
         touch=("backbone",),
     )
     every = segments // 9

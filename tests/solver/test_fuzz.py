@@ -156,7 +156,7 @@ def test_robots(case):
     robot = survives(kind, **arguments)
     if robot is None:
         return
-    assert np.isfinite([robot.stiffness, robot.rigidity / robot.length_mm**2, *robot.edges_mm]).all()
+    assert np.isfinite([robot.energy_scale, robot.rigidity / robot.length_mm**2, *robot.edges_mm]).all()
     assert np.isfinite(robot.lines_mm).all()
     if robot.positions > 2000:
         return
@@ -256,11 +256,11 @@ def test_batches(spatially, first, second, third):
         lambda: batch.probe(first),
         lambda: batch.scene(second),
         lambda: check(batch.equilibrium(third)),
-        lambda: batch.reaches(first, [0.1], 0.5, 8.0),
-        lambda: batch.reaches([1], first, 0.5, 8.0),
-        lambda: batch.reaches([1], [0.1], first, second),
-        lambda: batch.reaches([1], [0.1], 0.5, 8.0, third),
-        lambda: batch.reaches([1], [0.1], 0.5, 8.0, None, third),
+        lambda: batch.ramp_reaches_force(first, [0.1], 0.5, 8.0),
+        lambda: batch.ramp_reaches_force([1], first, 0.5, 8.0),
+        lambda: batch.ramp_reaches_force([1], [0.1], first, second),
+        lambda: batch.ramp_reaches_force([1], [0.1], 0.5, 8.0, third),
+        lambda: batch.ramp_reaches_force([1], [0.1], 0.5, 8.0, None, third),
         lambda: type(batch)(first, 2, 1),
         lambda: type(batch)(batch.robot, first, 1),
         lambda: type(batch)(batch.robot, 2, second),

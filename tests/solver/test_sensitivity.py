@@ -7,14 +7,14 @@ import pytest
 
 from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver
 from solver.forces import force_true
-from solver.robot import CABLES, LINES
+from solver.robot import LINES, MODELS
 from solver.sensitivity import CABLE, LENGTH, obstacle_rows, sensitivity
 
 ROBOT = Robot(
     length_mm=180, segments=18, offset_mm=8, touch=LINES, between=1, max_tension=100, length_range_mm=(170, 190)
 )
-ROBOTS = [replace(ROBOT, cable=cable) for cable in CABLES]
-EVERY_ROBOT = pytest.mark.parametrize("robot", ROBOTS, ids=CABLES)
+ROBOTS = [replace(ROBOT, model=model) for model in MODELS]
+EVERY_ROBOT = pytest.mark.parametrize("robot", ROBOTS, ids=MODELS)
 OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
 PUSHED = [
     Circle(center=(44, 104), radius=15),
@@ -27,13 +27,13 @@ PUSHED = [
 SCENES = [
     *([obstacle] for obstacle in PUSHED),
     [Circle(center=(33, 89), radius=12.5), Circle(center=(59, 140), radius=15)],
-    *([replace(obstacle, stiffness=((0.4, 0.1), (0.1, 0.2)))] for obstacle in PUSHED),
-    [Circle(center=(33, 89), radius=12.5, stiffness=1.0), Circle(center=(59, 140), radius=15)],
+    *([replace(obstacle, spring=((0.4, 0.1), (0.1, 0.2)))] for obstacle in PUSHED),
+    [Circle(center=(33, 89), radius=12.5, spring=1.0), Circle(center=(59, 140), radius=15)],
 ]
 EVERY_SCENE = pytest.mark.parametrize(
     "obstacles",
     SCENES,
-    ids=lambda scene: "+".join(o.kind + ("" if o.stiffness is None else " on a spring") for o in scene),
+    ids=lambda scene: "+".join(o.kind + ("" if o.spring is None else " on a spring") for o in scene),
 )
 CABLE_MM, STEP = 9.0, 1e-4
 

@@ -19,7 +19,7 @@ PUSHED = [
     Box(center=(40, 18, 104), sizes=(26, 30, 28), edge=6, axis=(1, 0.3, 0.2)),
     HalfSpace(point=(31, 12, 127), normal=(-1, -0.3, 0.2), nodes=(14,)),
 ]
-SCENES = [*([o] for o in PUSHED), *([replace(o, stiffness=SPRING)] for o in PUSHED)]
+SCENES = [*([o] for o in PUSHED), *([replace(o, spring=SPRING)] for o in PUSHED)]
 COMMAND, STEP = np.array([7.0, 3.0]), 1e-4
 
 
@@ -76,9 +76,7 @@ def compare(slopes, row, ahead, behind):
     assert slopes.turns[row] == pytest.approx(turns, rel=1e-5, abs=1e-8 + 1e-5 * np.abs(turns).max())
 
 
-@pytest.mark.parametrize(
-    "obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].stiffness is None else " on a spring")
-)
+@pytest.mark.parametrize("obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].spring is None else " on a spring"))
 def test_everything(obstacles):
     equilibrium = solve(obstacles)
     assert equilibrium.contact.any()
