@@ -22,7 +22,7 @@ from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED
 from agents.learners import environments
 from agents.policy import Observation, effort, search
 from agents.tuned import DistilledSettings
-from ccr_gym.episodes import PrivilegedState
+from ccr_gym import PrivilegedState
 
 PROBE_MM = 0.02  # move that the slope of the force is measured with
 LEAST_SLOPE = 1e-3  # slope that is believed [N/mm]

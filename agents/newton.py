@@ -8,11 +8,9 @@ import numpy as np
 from agents.lag import Lag, seen_cables
 from agents.policy import Observation, Tare, effort, search, set_points
 from agents.tuned import NEWTON_GAIN
-from ccr_gym.episodes import PrivilegedState
-from ccr_gym.observation import FORCE_SCALE_N
-from solver import Equilibrium
-from solver.sensitivity import CABLE, LENGTH, sensitivity
-from solver.spatial.sensitivity import CABLES, spatial_sensitivity
+from ccr_gym import FORCE_SCALE_N, PrivilegedState
+from solver import Equilibrium, Sensitivity, sensitivity
+from solver.spatial import SpatialSensitivity, spatial_sensitivity
 
 PROBE_MM = 1e-3  # move of a trial
 PRIOR = np.full(2, 1e-6)  # a reading of 1 mN that agrees with the model [N²]
@@ -99,9 +97,11 @@ class NewtonController:
         equilibrium = self._env.get_wrapper_attr("equilibrium")
         counted = slice(None) if target is None else slice(target, target + 1)
         if isinstance(equilibrium, Equilibrium):
-            slopes = sensitivity(equilibrium).forces[[CABLE, LENGTH] if insertion else [CABLE]]
+            slopes = sensitivity(equilibrium).forces[
+                [Sensitivity.CABLE, Sensitivity.LENGTH] if insertion else [Sensitivity.CABLE]
+            ]
         else:
-            slopes = spatial_sensitivity(equilibrium).forces[CABLES]
+            slopes = spatial_sensitivity(equilibrium).forces[SpatialSensitivity.CABLES]
         return np.asarray(truth.rigidity_ratio * slopes[:, counted].sum(axis=1))
 
     def _tried(self, truth: PrivilegedState) -> np.ndarray:

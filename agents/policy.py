@@ -4,8 +4,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ccr_gym.episodes import PrivilegedState
-from ccr_gym.observation import AHEAD, FORCE_SCALE_N
+from ccr_gym import AHEAD, FORCE_SCALE_N, PrivilegedState
 
 Observation = dict[str, np.ndarray]
 

@@ -21,7 +21,7 @@ import numpy as np
 from agents.bench import space
 from agents.bench.kernel import PlanarStep, contact_mix
 from solver import Robot
-from solver.obstacles import SHAPES
+from solver.common.obstacle import SHAPES
 
 HERE = Path(__file__).parent
 RECORDED = HERE / "instructions.json"

@@ -10,10 +10,12 @@ import numpy as np
 
 from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
 from solver import Robot, Scene
-from solver.batch import BaseBatch, BatchSolver, ReferenceBatch
-from solver.forces import virtual_work
-from solver.layout import CABLE, LENGTH, PLANE, SPACE, TENSION, Layout, Model, layout
-from solver.operations import ARRAYS, NUMBERS, Operations
+from solver.common.batch import BaseBatch
+from solver.common.layout import CABLE, LENGTH, PLANE, SPACE, TENSION, Layout, Model
+from solver.common.operations import ARRAYS, NUMBERS, Operations
+from solver.planar.batch import BatchSolver, ReferenceBatch
+from solver.planar.forces import virtual_work
+from solver.planar.layout import layout
 from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialRobot
 from solver.spatial import forces as spatial_forces
 from solver.spatial.equilibrium import spatial_layout

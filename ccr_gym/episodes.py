@@ -16,9 +16,9 @@ from ccr_gym.reward import TERMS, reward_terms
 from ccr_gym.sensing import SensorModel
 from ccr_gym.settings import Settings
 from ccr_gym.tasks import COURSE_STEPS, Assignment, Task, assign, check_robot
-from solver.batch import BaseBatch
-from solver.layout import SPACE, Layout
-from solver.solve import Solver
+from solver import Solver
+from solver.common.batch import BaseBatch
+from solver.common.layout import SPACE, Layout
 from solver.spatial import SpatialSolver
 
 ALL = slice(None)

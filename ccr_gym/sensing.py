@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccr_gym.checks import check_fields, check_range, checked
-from solver.validation import SMALLEST
+from solver.common.validation import SMALLEST
 
 if TYPE_CHECKING:
     from ccr_gym.bodies import Body

@@ -18,8 +18,8 @@ from ccr_gym.checks import (
 from ccr_gym.reward import RewardWeights
 from ccr_gym.sensing import Sensing
 from solver import Robot
+from solver.common.validation import SMALLEST
 from solver.spatial import SpatialRobot
-from solver.validation import SMALLEST
 
 MAX_FRICTION = 10.0
 

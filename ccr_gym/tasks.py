@@ -24,11 +24,11 @@ from ccr_gym.checks import (
 )
 from ccr_gym.observation import FORCE_SCALE_N
 from solver import Circle, HalfPlane, Robot, Scene
-from solver.batch import BaseBatch
-from solver.scene import MAX_OBSTACLES
-from solver.solve import check_core
+from solver.common.batch import BaseBatch
+from solver.common.checks import check_core
+from solver.common.scene import MAX_OBSTACLES
+from solver.common.validation import SMALLEST
 from solver.spatial import Cylinder, SpatialRobot, Sphere
-from solver.validation import SMALLEST
 
 MAX_DRAWS = 1000
 HALF_CYLINDER_MM = 30.0

@@ -24,7 +24,7 @@ from ccr_gym.env import METADATA, Observation, make_settings, single_spaces
 from ccr_gym.episodes import EpisodeBatch, PrivilegedState
 from ccr_gym.reward import TERMS
 from ccr_gym.tasks import Task
-from solver.validation import is_listed, shown
+from solver.common.validation import is_listed, shown
 
 Infos = dict[str, Any]
 MAX_ENVS = 65_536

@@ -14,12 +14,18 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
-from solver import Circle, Equilibrium, Robot, Scene, Solver, Status
-from solver.batch import BatchSolver
-from solver.free import clearance
-from solver.layout import CABLE
-from solver.memo import TransitionMemo
-from solver.reference import ReferenceSolver
+from solver import (
+    BatchSolver,
+    Circle,
+    Equilibrium,
+    ReferenceSolver,
+    Robot,
+    Scene,
+    Solver,
+    Status,
+    TransitionMemo,
+    clearance,
+)
 
 STEPS_PER_SCENE = 100
 LARGEST_CABLE = 14.0  # [mm]
@@ -169,7 +175,7 @@ def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
     records = []
     for k in range(steps):
         drift = generator.uniform(-0.5, 0.5, count) + (DRIFT if k % 100 < 80 else -3 * DRIFT)
-        commands = np.clip(batches[0].blocks[:, CABLE] + drift, 0, LARGEST_CABLE)
+        commands = np.clip(batches[0].layout.cables(batches[0].blocks)[:, 0] + drift, 0, LARGEST_CABLE)
         if k % 10 == 0:
             records.append((k, [batches[0].equilibrium(i) for i in range(count)], commands.tolist()))
         for column, batch in enumerate(batches, start=1):

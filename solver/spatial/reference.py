@@ -6,16 +6,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from solver.geometry import touchable_points
-from solver.layout import SPACE
-from solver.reference import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
-from solver.scene import Scene
-from solver.solve import check_clear, check_core, check_scene
+from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.geometry import touchable_points
+from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
+from solver.common.layout import SPACE
+from solver.common.scene import Scene
+from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
 from solver.spatial.solve import check_cables
-from solver.status import Status
 
 
 class SpatialReferenceSolver:

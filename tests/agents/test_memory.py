@@ -5,8 +5,7 @@ from gymnasium import spaces
 
 from agents.memory import DECAYS, MOVES, Memory, MemoryVecEnv
 from agents.sb3_adapter import SB3VecEnv
-from ccr_gym import ENV_IDS
-from ccr_gym.settings import Settings
+from ccr_gym import ENV_IDS, Settings
 
 
 def memory():

@@ -13,7 +13,7 @@ from soak.cores import line_points
 from soak.scale import scale_robot, scale_scene
 from soak.shapes import distance
 from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver, spatial
-from solver.robot import LINES
+from solver.planar.robot import LINES
 from solver.spatial import SpatialRobot, SpatialSolver
 
 MODELS = ("paper", "rod", "space")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from solver import Circle, Robot, Scene, Solver, Status
-from solver.batch import BatchSolver
-from solver.robot import MODELS
+from solver.planar.batch import BatchSolver
+from solver.planar.robot import MODELS
 
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
@@ -79,7 +79,7 @@ FORKED = """
 import os
 import numpy as np
 from solver import Robot, Scene
-from solver.batch import BatchSolver
+from solver.planar.batch import BatchSolver
 batch = BatchSolver(Robot.prototype(), 64, 0, threads=2)
 for i in range(64):
     batch.assign(i, Scene())
@@ -215,7 +215,7 @@ INTERRUPTED = """
 import signal, threading, time
 import numpy as np
 from solver import Circle, Robot, Scene
-from solver.batch import BatchSolver
+from solver.planar.batch import BatchSolver
 
 robot, scene = Robot(length_mm=180, segments=200, offset_mm=8), Scene([Circle(center=(44, 104), radius=15)])
 count = 4000

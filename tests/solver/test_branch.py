@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
-from solver.robot import LINES
+from solver.planar.robot import LINES
 
 BLOCKING = ((32.4, 84.7, 14.9), (57.6, 148.6, 14.3))
 SLIPPERY = [

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
-from solver.forces import force_true
-from solver.formulation import disk_gap_function, limits, node_problem
-from solver.sensitivity import CABLE, sensitivity
+from solver.planar.forces import force_true
+from solver.planar.formulation import disk_gap_function, limits, node_problem
+from solver.planar.sensitivity import CABLE, sensitivity
 
 CIRCLE = Circle(center=(42, 143), radius=28)
 SIZES = pytest.mark.parametrize(("length", "radius", "thickness"), [(10, 8, 0), (15, 60, 0), (15, 40, 2), (10, 25, 3)])

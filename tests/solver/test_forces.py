@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from solver import Capsule, Circle, Ellipse, Equilibrium, HalfPlane, Polygon, Robot, Scene, Solver
-from solver.forces import VirtualWork, force_true, onset_tension
-from solver.formulation import limits, node_derivatives
-from solver.free import fitted_slopes, tip_slopes
-from solver.layout import TENSION, layout
-from solver.robot import MODELS
+from solver.common.layout import TENSION
+from solver.planar.forces import VirtualWork, force_true, onset_tension
+from solver.planar.formulation import limits, node_derivatives
+from solver.planar.free import fitted_slopes, tip_slopes
+from solver.planar.layout import layout
+from solver.planar.robot import MODELS
 
 SCENES = [
     Scene([Circle(center=(44, 104), radius=15)]),

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Solver
-from solver.formulation import (
+from solver.common.gap_laws import gap_function
+from solver.planar.formulation import (
     GAP_LAWS,
     arc_function,
-    gap_function,
     node_problem,
     segment_closure,
     segment_function,

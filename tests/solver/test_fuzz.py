@@ -20,6 +20,7 @@ from solver import (
     ReferenceSolver,
     Robot,
     Scene,
+    Sensitivity,
     Solver,
     Status,
     forces,
@@ -27,9 +28,9 @@ from solver import (
     spatial,
 )
 from solver import sensitivity as sensitivities
-from solver.batch import BatchSolver
-from solver.memo import TransitionMemo
-from solver.spatial import SpatialBatchSolver, SpatialEquilibrium, SpatialRobot, SpatialSolver
+from solver.cache.memo import TransitionMemo
+from solver.planar.batch import BatchSolver
+from solver.spatial import SpatialBatchSolver, SpatialEquilibrium, SpatialRobot, SpatialSensitivity, SpatialSolver
 from solver.spatial import forces as spatial_forces
 from solver.spatial import sensitivity as spatial_sensitivities
 
@@ -221,10 +222,10 @@ def test_functions(first, second, third):
     survives(free.clearance, ROBOT, SCENE, third)
     survives(sensitivities.sensitivity, first)
     survives(sensitivities.sensitivity, PULLED, second)
-    survives(sensitivities.obstacle_rows, third)
+    survives(Sensitivity.obstacle_rows, third)
     survives(spatial_sensitivities.spatial_sensitivity, first)
     survives(spatial_sensitivities.spatial_sensitivity, SPATIAL_PULLED, second)
-    survives(spatial_sensitivities.obstacle_rows, third)
+    survives(SpatialSensitivity.obstacle_rows, third)
 
 
 def make_batch(spatially):

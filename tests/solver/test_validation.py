@@ -24,9 +24,9 @@ from solver import (
     forces,
     free,
 )
-from solver.batch import BatchSolver
-from solver.memo import TransitionMemo
-from solver.sensitivity import sensitivity
+from solver.cache.memo import TransitionMemo
+from solver.planar.batch import BatchSolver
+from solver.planar.sensitivity import sensitivity
 from solver.spatial import SpatialRobot, Sphere
 
 PROTOTYPE = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0}

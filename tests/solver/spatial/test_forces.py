@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver import HalfPlane, Robot, Scene, Solver
-from solver.forces import VirtualWork
+from solver.planar.forces import VirtualWork
 from solver.spatial import HalfSpace, SpatialSolver, Sphere
 from solver.spatial.forces import SpatialVirtualWork, force_true, with_friction
 

@@ -7,8 +7,17 @@ import numpy as np
 import pytest
 
 from solver import Scene
-from solver.spatial import Box, Capsule, Cylinder, HalfSpace, SpatialRobot, SpatialSolver, Sphere
-from solver.spatial.sensitivity import LENGTH, obstacle_rows, spatial_sensitivity
+from solver.spatial import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    SpatialRobot,
+    SpatialSensitivity,
+    SpatialSolver,
+    Sphere,
+    spatial_sensitivity,
+)
 
 ROBOT = SpatialRobot(length_mm=180, segments=18, offset_mm=8, angle=1.8, max_tension=100, between=1)
 SPRING = ((0.4, 0.1, 0.0), (0.1, 0.2, 0.05), (0.0, 0.05, 0.3))
@@ -83,8 +92,8 @@ def test_everything(obstacles):
     slopes = spatial_sensitivity(equilibrium)
     for row, change in enumerate(STEP * np.eye(2)):
         compare(slopes, row, solve(obstacles, COMMAND + change), solve(obstacles, COMMAND - change))
-    compare(slopes, LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
-    first = obstacle_rows(0).start
+    compare(slopes, SpatialSensitivity.LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
+    first = SpatialSensitivity.obstacle_rows(0).start
     motions = [
         *(lambda by, axis=axis: {"shift": by * axis} for axis in np.eye(3)),
         *(lambda by, axis=axis: {"axis": axis, "turn": by} for axis in range(3)),

@@ -6,13 +6,14 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from solver.formulation import arc_function
-from solver.geometry import touching_gaps, touching_points
-from solver.layout import PLANE
-from solver.robot import Robot
-from solver.scene import Scene
-from solver.solve import check_scene
-from solver.validation import instance, number, whole
+from solver.common.checks import check_scene
+from solver.common.geometry import touching_gaps
+from solver.common.layout import PLANE
+from solver.common.scene import Scene
+from solver.common.validation import instance, number, whole
+from solver.planar.formulation import arc_function
+from solver.planar.geometry import touching_points
+from solver.planar.robot import Robot
 
 NEWTON_ITERATIONS = 8
 RESOLVED = 1e-9  # of the cable limit: a line over less is fitted to roundoff

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.formulation import GapLaw
-from solver.obstacles import Obstacle
-from solver.validation import shown
+from solver.common.gap_laws import GapLaw
+from solver.common.obstacle import Obstacle
+from solver.common.validation import shown
 
 MAX_OBSTACLES = 32
 

@@ -3,22 +3,18 @@
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import lru_cache
 from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
 
-from solver import _kernel
-from solver.equilibrium import BaseEquilibrium, Equilibrium
-from solver.geometry import touching_gaps, touching_points
-from solver.layout import CABLE, PLANE, Layout, Model, layout
-from solver.reference import ReferenceSolver
-from solver.robot import Robot
-from solver.scene import MAX_OBSTACLES, Scene
-from solver.solve import check_clear, check_core, check_scene, kernel_robot, kernel_scene
-from solver.status import Status
-from solver.validation import LARGEST, array, instance, positive, sequence, shown, whole
+from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.equilibrium import BaseEquilibrium
+from solver.common.geometry import touching_gaps
+from solver.common.layout import Layout, Model
+from solver.common.scene import MAX_OBSTACLES, Scene
+from solver.common.status import Status
+from solver.common.validation import LARGEST, array, instance, positive, sequence, shown, whole
 
 MAX_PULL_STEPS = 100_000  # of a trial pull
 
@@ -367,51 +363,3 @@ def _check_memory(count: int, size: int) -> None:
             f"count is {count}; their blocks need {needed / 1e9:.3g} GB and this machine has {there / 1e9:.3g} GB: "
             f"make batches of at most {there // (8 * size)}"
         )
-
-
-class BatchSolver(BaseBatch):
-    """Many robots in the plane, each moved as :class:`solver.Solver` would; see :class:`BaseBatch`."""
-
-    model = PLANE
-    robot_kind = Robot
-
-    def _straight_points(self) -> np.ndarray:
-        nodes = np.zeros((self.robot.segments + 1, 3))
-        nodes[:, 1] = np.linspace(0.0, self.robot.length_mm, len(nodes))
-        return touching_points(self.robot, nodes)
-
-    def _make_layout(self, obstacles: int) -> Layout:
-        return layout(self.robot, obstacles)
-
-    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.Fleet:
-        return _kernel.Fleet(kernel_robot(self.robot), self.count, obstacles, threads)
-
-    def _kernel_scene(self, scene: Scene) -> _kernel.Scene:
-        return kernel_scene(self.robot, scene)
-
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> Equilibrium:
-        return Equilibrium(self.robot, scene, block, status, *work)
-
-
-class ReferenceBatch(BatchSolver):
-    """The same robots moved by :class:`solver.ReferenceSolver`, one after the other and slowly.
-
-    Trial pulls of :meth:`ramp_reaches_force` are the kernel's.
-    """
-
-    def _move(self, robots: list[int]) -> None:
-        for robot in robots:
-            scene = self._scenes[robot]
-            assert scene is not None
-            reference = _reference(self.robot, scene)
-            if self.commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
-                reached = reference.rest()
-            else:
-                reached = reference.step(self._equilibrium(robot), float(self.commands[robot, CABLE]))
-            self.blocks[robot] = reached.block
-            self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
-
-
-@lru_cache(maxsize=64)
-def _reference(robot: Robot, scene: Scene) -> ReferenceSolver:
-    return ReferenceSolver(robot, scene)

@@ -10,9 +10,10 @@ import casadi as ca
 import numpy as np
 
 from solver._kernel import SHAPE_SIZE
-from solver.formulation import GapLaw, gap_function
-from solver.obstacles import SHARPEST, Extent, Obstacle, directions
-from solver.validation import Pair, Point, finite, instance, sequence, shown, unit, whole
+from solver.common.gap_laws import GapLaw, gap_function
+from solver.common.obstacle import SHARPEST, Extent, Obstacle
+from solver.common.validation import Pair, Point, finite, instance, sequence, shown, unit, whole
+from solver.planar.obstacles import directions
 
 UNARY = (
     *("NEG", "EXP", "LOG", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "NOT", "FLOOR", "CEIL"),
