@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Obstacle, Polygon, Robot, Scene, free
+from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Obstacle, Polygon, Robot, Scene
+from solver.planar import free
 
 
 def make_circles(*circles: tuple[float, float, float]) -> Scene:

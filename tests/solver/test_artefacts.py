@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from solver import artefacts
+from solver.cache import artefacts
 from solver.cache.artefacts import ArtefactStore, artefact_key
 
 KEY = artefact_key("formulation", "casadi", "cc")

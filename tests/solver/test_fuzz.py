@@ -23,12 +23,11 @@ from solver import (
     Sensitivity,
     Solver,
     Status,
-    forces,
-    free,
     spatial,
 )
 from solver import sensitivity as sensitivities
 from solver.cache.memo import TransitionMemo
+from solver.planar import forces, free
 from solver.planar.batch import BatchSolver
 from solver.spatial import SpatialBatchSolver, SpatialEquilibrium, SpatialRobot, SpatialSensitivity, SpatialSolver
 from solver.spatial import forces as spatial_forces

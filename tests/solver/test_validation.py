@@ -21,10 +21,9 @@ from solver import (
     Scene,
     Solver,
     Status,
-    forces,
-    free,
 )
 from solver.cache.memo import TransitionMemo
+from solver.planar import forces, free
 from solver.planar.batch import BatchSolver
 from solver.planar.sensitivity import sensitivity
 from solver.spatial import SpatialRobot, Sphere
