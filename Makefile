@@ -8,6 +8,7 @@ INSTALL := $(VENV)/.installed
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
 CHECK = $(BIN)/ctest --output-on-failure --test-dir
+CXX_FILES = $(shell git ls-files "*.cpp" "*.hpp" "*.inc")
 SEED ?= 1
 FUZZ ?= 45
 
@@ -16,11 +17,12 @@ demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controllers, wr
 	$(BIN)/ccr-gym evaluate --runs runs/demo --out runs/demo
 
 test: $(INSTALL)
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	$(BIN)/python -m pytest -n auto --dist worksteal $(PYTEST)
 
 lint: $(INSTALL)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/clang-format --dry-run --Werror $(CXX_FILES)
 	$(BIN)/mypy
 
 native: $(INSTALL)  ## tests of the kernel in C++ (needs doctest: apt-get install doctest-dev)
@@ -47,7 +49,7 @@ soak: $(INSTALL)
 	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
 	$(BIN)/python -m pytest -k fuzz --hypothesis-profile=default
 
-$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/* solver/native/*/*) solver/formulation.py solver/spatial/formulation.py solver/codegen.py
+$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/* solver/native/*/*) solver/common/gap_laws.py solver/planar/formulation.py solver/spatial/formulation.py solver/codegen.py
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	touch $@

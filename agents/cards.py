@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from agents.config import EvaluateConfig
 from agents.suite import Result
-from ccr_gym.sensing import Sensing
+from ccr_gym import Sensing
 
 ABOUT = {
     "PPO": "Proximal policy optimisation (Stable-Baselines3); sees the observation and a fixed memory.",

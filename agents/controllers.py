@@ -7,7 +7,7 @@ import numpy as np
 
 from agents.policy import Observation, Tare, search
 from agents.tuned import P_GAINS, PI_GAINS
-from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym import FORCE_SCALE_N
 
 
 @dataclass(slots=True)

@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from solver import Equilibrium
-from solver.forces import force_true
-from solver.sensitivity import CABLE, LENGTH, sensitivity
+from solver import Equilibrium, Sensitivity, force_true, sensitivity
 
 
 class EquilibriumOutputs(torch.autograd.Function):
@@ -48,16 +46,16 @@ class EquilibriumOutputs(torch.autograd.Function):
 
 def _followed(equilibrium: Equilibrium, row: int, value: float) -> bool:
     """Whether the equilibrium is where a value commands; a stalled or blocked robot is not."""
-    reached = {CABLE: equilibrium.cable_mm, LENGTH: equilibrium.length_mm}.get(row, value)
+    reached = {Sensitivity.CABLE: equilibrium.cable_mm, Sensitivity.LENGTH: equilibrium.length_mm}.get(row, value)
     return bool(np.isclose(reached, value, rtol=1e-6, atol=0))
 
 
 def _determined(equilibrium: Equilibrium) -> bool:
-    return equilibrium.cable_mm > 0 or equilibrium.robot.cable == "sliding"
+    return equilibrium.cable_mm > 0 or equilibrium.robot.model == "rod"
 
 
 def differentiable(
-    values: torch.Tensor, equilibria: Sequence[Equilibrium], rows: Sequence[int] = (CABLE,)
+    values: torch.Tensor, equilibria: Sequence[Equilibrium], rows: Sequence[int] = (Sensitivity.CABLE,)
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Node poses, tensions and contact forces of a batch, with gradients in the values they were solved for.
 
@@ -68,7 +66,7 @@ def differentiable(
     Args:
         values: What each was solved for, ``(b, k)`` on the CPU, or ``(b,)`` for one value each.
         equilibria: The answers; robots of equally many segments among equally many obstacles.
-        rows: What the values are: rows of a :class:`solver.sensitivity.Sensitivity`, such as the cable displacement and
+        rows: What the values are: rows of a :class:`solver.Sensitivity`, such as the cable displacement and
             the length commanded, or the place of an obstacle.
 
     Returns:

@@ -22,7 +22,7 @@ from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED
 from agents.learners import environments
 from agents.policy import Observation, effort, search
 from agents.tuned import DistilledSettings
-from ccr_gym.fleet import Truth
+from ccr_gym import PrivilegedState
 
 PROBE_MM = 0.02  # move that the slope of the force is measured with
 LEAST_SLOPE = 1e-3  # slope that is believed [N/mm]
@@ -35,7 +35,7 @@ def teach(envs: Any, observation: Observation) -> np.ndarray:
     Newton's step to the set-point, with the slope from a trial move of the robots as they are; full speed towards the
     obstacle before anything touches. In space both cables move along the way of the search, an insertion stays.
     """
-    truth: Truth = envs.get_attr("truth", [0])[0]
+    truth: PrivilegedState = envs.get_attr("privileged_state", [0])[0]
     settings, body = envs.get_attr("settings", [0])[0], envs.get_attr("task", [0])[0].body
     way = search(observation).astype(float)
     force = np.linalg.norm(truth.force, axis=1)

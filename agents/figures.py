@@ -15,7 +15,6 @@ from agents.config import POLICIES
 from agents.evaluate import Episode
 from agents.files import replacing
 from agents.statistics import profile
-from ccr_gym.rendering import onto_surface, surface_axes
 from solver import Equilibrium, HalfPlane
 from solver.spatial import SpatialEquilibrium
 
@@ -178,5 +177,5 @@ def _plate(wall: HalfPlane, backbone: np.ndarray) -> np.ndarray:
     """Ends of the part of a wall that is drawn, ``(2, 2)`` [mm]: a plate if only some nodes touch it, else all."""
     half = 200.0 if wall.nodes is None else 15.0
     touching = backbone[list(wall.nodes or range(len(backbone)))]
-    center = onto_surface(wall, touching.mean(axis=0))
-    return np.asarray(center + half * np.array([[-1.0], [1.0]]) * surface_axes(wall)[1])
+    center = wall.nearest(touching.mean(axis=0))
+    return np.asarray(center + half * np.array([[-1.0], [1.0]]) * wall.axes[1])

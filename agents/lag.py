@@ -67,7 +67,7 @@ def seen_cables(observation: Mapping[str, np.ndarray], robot: Any) -> np.ndarray
     if "frames" not in observation:
         points, angles = max(robot.lengths_mm) * nodes[..., :2], np.pi * nodes[..., 2]
         holes = points + robot.offset_mm * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        turns = np.diff(angles) if robot.cable == "sliding" else 0.0
+        turns = np.diff(angles) if robot.model == "rod" else 0.0
         return np.asarray(_length(points, turns) - _length(holes))[..., None]
     nodes *= robot.length_mm
     frames = observation["frames"].astype(float).reshape(*shape, 2, 3)

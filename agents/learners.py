@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 from agents.actor import CLIP, EPSILON
 from agents.config import TrainConfig
 from agents.memory import MemoryVecEnv
-from agents.sb3_adapter import FleetVecEnv
+from agents.sb3_adapter import SB3VecEnv
 from agents.tuned import DistilledSettings, LearnerSettings, PPOSettings, RecurrentPPOSettings, SACSettings
 
 KINDS: dict[type[LearnerSettings], type[BaseAlgorithm]] = {
@@ -25,8 +25,8 @@ def environments(config: TrainConfig, count: int, seed: int) -> VecEnv:
     """Environments of training scenes as a learner sees them, before their observations are scaled."""
     told: dict[str, Any] = {"sensing": config.sensing, "split": "train"}
     if isinstance(config.learner, RecurrentPPOSettings):
-        return VecMonitor(FleetVecEnv(config.env_id, count, seed, config.threads, **told))
-    return VecMonitor(MemoryVecEnv(FleetVecEnv(config.env_id, count, seed, config.threads, obs_mode="dict", **told)))
+        return VecMonitor(SB3VecEnv(config.env_id, count, seed, config.threads, **told))
+    return VecMonitor(MemoryVecEnv(SB3VecEnv(config.env_id, count, seed, config.threads, obs_mode="dict", **told)))
 
 
 def scaled(bare: VecEnv, config: TrainConfig) -> VecNormalize:

@@ -15,8 +15,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from agents.lag import Lag, seen_cables
-from ccr_gym.observation import FORCE_SCALE_N
-from ccr_gym.settings import Settings
+from ccr_gym import FORCE_SCALE_N, Settings
 
 DECAYS = (0.0, 0.5, 0.8, 0.95)  # of the averages of past errors, per step
 TINY = 1e-9

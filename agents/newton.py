@@ -8,11 +8,9 @@ import numpy as np
 from agents.lag import Lag, seen_cables
 from agents.policy import Observation, Tare, effort, search, set_points
 from agents.tuned import NEWTON_GAIN
-from ccr_gym.fleet import Truth
-from ccr_gym.observation import FORCE_SCALE_N
-from solver import Equilibrium
-from solver.sensitivity import CABLE, LENGTH, sensitivity
-from solver.spatial.sensitivity import CABLES, spatial_sensitivity
+from ccr_gym import FORCE_SCALE_N, PrivilegedState
+from solver import Equilibrium, Sensitivity, sensitivity
+from solver.spatial import SpatialSensitivity, spatial_sensitivity
 
 PROBE_MM = 1e-3  # move of a trial
 PRIOR = np.full(2, 1e-6)  # a reading of 1 mN that agrees with the model [N²]
@@ -59,7 +57,7 @@ class NewtonController:
 
     def act(self, observation: Observation) -> np.ndarray:
         """Pull until something touches, then step to where the force is that of the set-point."""
-        truth: Truth = self._env.get_wrapper_attr("truth")
+        truth: PrivilegedState = self._env.get_wrapper_attr("privileged_state")
         task, settings = self._env.get_wrapper_attr("task"), self._env.get_wrapper_attr("settings")
         if not self.oracle:
             truth = self._seen(observation, truth, settings)
@@ -73,15 +71,15 @@ class NewtonController:
             lacking = truth.goal - truth.force
         (low, high), free = task.body.bounds(settings), np.ones(len(slopes), bool)
         for _ in free:  # a motor at its bound leaves the rest to the other
-            damped = slopes @ slopes.T + (truth.stiffness * self.damping) ** 2 * np.eye(len(slopes))
+            damped = slopes @ slopes.T + (truth.rigidity_ratio * self.damping) ** 2 * np.eye(len(slopes))
             increments = np.linalg.solve(damped, slopes @ lacking)
             free &= np.where(increments > 0, truth.motors < high, truth.motors > low)
             slopes = slopes * free[:, None]
         return effort(self.gain * increments, truth, task.body.increments(settings))
 
-    def _seen(self, observation: Observation, truth: Truth, settings: Any) -> Truth:
+    def _seen(self, observation: Observation, truth: PrivilegedState, settings: Any) -> PrivilegedState:
         """What it takes for the truth if it does not know what is hidden."""
-        force, cables = truth.force / truth.stiffness, observation["cable"].size  # the force of the model
+        force, cables = truth.force / truth.rigidity_ratio, observation["cable"].size  # the force of the model
         vector = FORCE_SCALE_N * observation["desired_force"].astype(float)
         goal: Any = vector if vector.size > 1 else set_points(observation, 1).item()
         self._lag.see(truth.motors[None, :cables], seen_cables(observation, settings.robot)[None])
@@ -92,19 +90,21 @@ class NewtonController:
             self._fit = self._fit + then * np.array([np.linalg.norm(measured), then])
         ratio = self._fit[0] / self._fit[1]
         slack = np.where(np.arange(truth.slack.size) < cables, self._lag.slack, 0.0)  # an insertion has none
-        return Truth(ratio * force, ratio, goal, truth.places, truth.motors, slack)
+        return PrivilegedState(ratio * force, ratio, goal, truth.places, truth.motors, slack)
 
-    def _slopes(self, truth: Truth, target: int | None, insertion: bool) -> np.ndarray:
+    def _slopes(self, truth: PrivilegedState, target: int | None, insertion: bool) -> np.ndarray:
         """Slopes of the force that counts in what the actions move, ``(actions, d)`` [N/mm]."""
         equilibrium = self._env.get_wrapper_attr("equilibrium")
         counted = slice(None) if target is None else slice(target, target + 1)
         if isinstance(equilibrium, Equilibrium):
-            slopes = sensitivity(equilibrium).forces[[CABLE, LENGTH] if insertion else [CABLE]]
+            slopes = sensitivity(equilibrium).forces[
+                [Sensitivity.CABLE, Sensitivity.LENGTH] if insertion else [Sensitivity.CABLE]
+            ]
         else:
-            slopes = spatial_sensitivity(equilibrium).forces[CABLES]
-        return np.asarray(truth.stiffness * slopes[:, counted].sum(axis=1))
+            slopes = spatial_sensitivity(equilibrium).forces[SpatialSensitivity.CABLES]
+        return np.asarray(truth.rigidity_ratio * slopes[:, counted].sum(axis=1))
 
-    def _tried(self, truth: Truth) -> np.ndarray:
+    def _tried(self, truth: PrivilegedState) -> np.ndarray:
         """The same of the true force, from trial moves that are solved exactly, which is faster."""
         probe = self._env.get_wrapper_attr("probe")
         trials = truth.places + PROBE_MM * np.eye(truth.places.size)

@@ -4,8 +4,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ccr_gym.fleet import Truth
-from ccr_gym.observation import AHEAD, FORCE_SCALE_N
+from ccr_gym import AHEAD, FORCE_SCALE_N, PrivilegedState
 
 Observation = dict[str, np.ndarray]
 
@@ -47,7 +46,7 @@ def set_points(observation: Observation, steps: int) -> np.ndarray:
     return np.asarray(FORCE_SCALE_N * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
 
 
-def effort(moves: np.ndarray, truth: Truth, increments: np.ndarray) -> np.ndarray:
+def effort(moves: np.ndarray, truth: PrivilegedState, increments: np.ndarray) -> np.ndarray:
     """Actions, ``(..., actions)``, for moves of what motors with play move [mm]: the play is taken up as well.
 
     Args:

@@ -14,9 +14,7 @@ from matplotlib.axes import Axes
 from agents import paper
 from agents.figures import draw_shape
 from agents.files import replacing, write_text
-from solver import Equilibrium, Robot, Scene, Solver
-from solver.forces import VirtualWork
-from solver.free import fitted_slopes, free_nodes, tip_slopes
+from solver import Equilibrium, Robot, Scene, Solver, VirtualWork, fitted_slopes, free_nodes, tip_slopes
 from solver.spatial import SpatialEquilibrium, SpatialRobot, SpatialSolver
 
 ROBOT = Robot.prototype(max_tension=math.inf)

@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 import ccr_gym  # noqa: F401 - registers the ids
 
 
-class FleetVecEnv(VecEnv):
+class SB3VecEnv(VecEnv):
     """Environments of one id, moved by one call of the solver.
 
     Episodes end in the step that resets them, as Stable-Baselines3 expects: the entry of ``infos`` then holds

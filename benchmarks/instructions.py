@@ -21,22 +21,22 @@ import numpy as np
 from agents.bench import space
 from agents.bench.kernel import PlanarStep, contact_mix
 from solver import Robot
-from solver.obstacles import SHAPES
+from solver.common.obstacle import SHAPES
 
 HERE = Path(__file__).parent
 RECORDED = HERE / "instructions.json"
 STEPS = 2000
 
 
-def planar(cable: str) -> list[PlanarStep]:
-    """The contact mix of the plane with one kind of cable."""
-    return list(contact_mix(STEPS, robot=replace(Robot.prototype(), cable=cable)))
+def planar(model: str) -> list[PlanarStep]:
+    """The contact mix of the plane with one model of the robot."""
+    return list(contact_mix(STEPS, robot=replace(Robot.prototype(), model=model)))
 
 
 Steps = Sequence[PlanarStep | space.SpatialStep]
 MIXES: dict[str, Callable[[], Steps]] = {
-    "uniform": lambda: planar("uniform"),
-    "sliding": lambda: planar("sliding"),
+    "paper": lambda: planar("paper"),
+    "rod": lambda: planar("rod"),
     "space": lambda: list(space.contact_mix(STEPS)),
 }
 
@@ -45,7 +45,7 @@ def write(steps: Steps, path: Path) -> None:
     """The recording that replay.cpp reads: numbers all, counts among them."""
     robot = steps[0].solver.robot
     in_space = not isinstance(robot, Robot)
-    sliding = not in_space and robot.cable == "sliding"
+    sliding = not in_space and robot.model == "rod"
     numbers = [robot.length_mm, robot.offset_mm, robot.rigidity, robot.max_tension]
     groups = [(solver, list(group)) for solver, group in groupby(steps, key=lambda step: step.solver)]
     parts: list[object] = [3 if in_space else 2, sliding, robot.segments, *numbers, len(groups)]

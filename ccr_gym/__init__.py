@@ -1,6 +1,8 @@
 """Gymnasium environments for contact-aware control of a cable-driven continuum robot; importing registers them."""
 
 from ccr_gym.env import ContactEnv
+from ccr_gym.episodes import PrivilegedState
+from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
 from ccr_gym.sensing import Sensing
@@ -18,13 +20,16 @@ from ccr_gym.tasks import (
 from ccr_gym.vector_env import ContactVectorEnv
 
 __all__ = [
+    "AHEAD",
     "ENV_IDS",
+    "FORCE_SCALE_N",
     "BracedPush",
     "ContactEnv",
     "ContactVectorEnv",
     "InsertAndPush",
     "InsertionSettings",
     "LoadCell",
+    "PrivilegedState",
     "PushObstacle",
     "RewardWeights",
     "Sensing",

@@ -10,10 +10,12 @@ import numpy as np
 
 from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
 from solver import Robot, Scene
-from solver.batch import BaseBatch, BatchSolver, ReferenceBatch
-from solver.forces import virtual_work
-from solver.layout import CABLE, LENGTH, PLANE, SPACE, TENSION, Layout, Model, layout
-from solver.operations import ARRAYS, NUMBERS, Operations
+from solver.common.batch import BaseBatch
+from solver.common.layout import CABLE, LENGTH, PLANE, SPACE, TENSION, Layout, Model
+from solver.common.operations import ARRAYS, NUMBERS, Operations
+from solver.planar.batch import BatchSolver, ReferenceBatch
+from solver.planar.forces import virtual_work
+from solver.planar.layout import layout
 from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialRobot
 from solver.spatial import forces as spatial_forces
 from solver.spatial.equilibrium import spatial_layout
@@ -134,7 +136,7 @@ class Plane(Body):
         x, y = force_true.tolist() if one else force_true.T
         if x == y == 0 if one else not force_true.any():
             return force_est
-        x, y = x - settings.friction * y, y + settings.friction * x
+        x, y = x - settings.estimator_friction * y, y + settings.estimator_friction * x
         slopes = layout.tip_slopes(blocks)
         load = blocks[..., TENSION] - layout.onset(blocks)[..., 0]
         if one:
@@ -212,7 +214,7 @@ class Space(Body):
             return np.zeros(force_true.shape)
         slopes = layout.tip_slopes(blocks) * np.array([1.0, 1.0, 1.0, *2 * [settings.robot.offset_mm]])
         loads = sides(layout.cables(blocks)) * layout.tensions(blocks) - layout.onset(blocks)
-        forces = spatial_forces.with_friction(force_true, slopes[..., :3], settings.friction)
+        forces = spatial_forces.with_friction(force_true, slopes[..., :3], settings.estimator_friction)
         return np.asarray(spatial_forces.virtual_work(forces, loads, slopes)[..., None] * forces)
 
     def told(self, blocks: np.ndarray, which: int | slice) -> dict[str, Any]:

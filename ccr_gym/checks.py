@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.validation import LARGEST, is_listed, is_real, is_whole, shown
+from solver.common.validation import LARGEST, is_listed, is_real, is_whole, shown
 
 
 def require(condition: bool, message: str) -> None:

@@ -18,7 +18,7 @@ from ccr_gym.checks import (
     check_type,
     refusal,
 )
-from ccr_gym.fleet import Fleet, Reading, Truth
+from ccr_gym.episodes import EpisodeBatch, ForceReading, PrivilegedState
 from ccr_gym.observation import FORCE_SCALE_N
 from ccr_gym.rendering import Frame, Renderer, draw_plane
 from ccr_gym.reward import TERMS
@@ -52,11 +52,11 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             check_choice("render_mode", render_mode, choices=METADATA["render_modes"])
         self.task, self.render_mode = task, render_mode
         self.settings = make_settings(type(self).__name__, task, settings, ("task", "render_mode"))
-        self._fleet = Fleet(task, self.settings, 1)
+        self._episodes = EpisodeBatch(task, self.settings, 1)
         self._renderer: Renderer | None = None
         self._started = False
-        self.observation_space, self.action_space = single_spaces(self._fleet, self.settings)
-        self._shape = (self._fleet.body.actions,)
+        self.observation_space, self.action_space = single_spaces(self._episodes, self.settings)
+        self._shape = (self._episodes.body.actions,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -81,17 +81,17 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         super().reset(seed=seed)
         try:
             if given is None:
-                self._fleet.draw([0], [self.np_random])
+                self._episodes.draw([0], [self.np_random])
             else:
-                self._fleet.give(0, given, self.np_random)
+                self._episodes.give(0, given, self.np_random)
         except BaseException:
             self._np_random, self._np_random_seed = generator
             raise
         self._started = True
         if self.render_mode == "human":
             self.render()
-        reading = self._fleet.read(0)
-        return self._observation(reading), self._fleet.infos(reading, (0.0,) * len(TERMS), 0)
+        reading = self._episodes.read(0)
+        return self._observation(reading), self._episodes.infos(reading, (0.0,) * len(TERMS), 0)
 
     def step(self, action: np.ndarray) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Move the cable by ``action · max_increment_mm``, as far as tension and obstacles allow.
@@ -102,13 +102,13 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         """
         self._check_started("step")
         pull = check_array("action", action, self._shape)
-        fleet = self._fleet
-        fleet.step(fleet.body.effort(pull), 0)
-        reading = fleet.read(0)
-        terms = tuple(map(float, fleet.rewards(reading, 0)))
+        episodes = self._episodes
+        episodes.step(episodes.body.effort(pull), 0)
+        reading = episodes.read(0)
+        terms = tuple(map(float, episodes.rewards(reading, 0)))
         if self.render_mode == "human":
             self.render()
-        return self._observation(reading), sum(terms), False, False, fleet.infos(reading, terms, 0)
+        return self._observation(reading), sum(terms), False, False, episodes.infos(reading, terms, 0)
 
     def render(self) -> np.ndarray | None:
         """The robot, obstacles, contacts, forces and set-point: ``(H, W, 3)`` uint8, or a window in human mode."""
@@ -116,7 +116,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human', and a reset")
             return None
         self._renderer = self._renderer or Renderer(self.metadata["render_fps"], WORLDS[self.task.body.model.space])
-        reading = self._fleet.read(0)
+        reading = self._episodes.read(0)
         frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, FORCE_SCALE_N)
         if self.render_mode == "rgb_array":
             return self._renderer.draw(frame)
@@ -137,17 +137,17 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             gymnasium.error.ResetNeeded: Before the first reset.
         """
         self._check_started("equilibrium")
-        return self._fleet.equilibrium(0)
+        return self._episodes.equilibrium(0)
 
     @property
-    def truth(self) -> Truth:
+    def privileged_state(self) -> PrivilegedState:
         """What no agent sees.
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
         """
-        self._check_started("truth")
-        return self._fleet.truth(0)
+        self._check_started("privileged_state")
+        return self._episodes.privileged_state(0)
 
     def probe(self, places: np.ndarray) -> np.ndarray:
         """Force on the robot that counts, ``(d,)`` [N], if what the actions move were elsewhere ``(actions,)`` [mm].
@@ -157,22 +157,22 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             ValueError: If the places are not finite real numbers of the right shape.
         """
         self._check_started("probe")
-        return np.asarray(self._fleet.probe(check_array("places", places, self._shape)[None])[0])
+        return np.asarray(self._episodes.probe(check_array("places", places, self._shape)[None])[0])
 
     def _check_started(self, asked: str) -> None:
         if not self._started:
             raise gymnasium.error.ResetNeeded(f"call reset() before {asked}")
 
-    def _observation(self, reading: Reading) -> Observation:
-        row = self._fleet.observe(reading, 0)
-        return row if self.settings.obs_mode == "flat" else self._fleet.observer.entries(row)
+    def _observation(self, reading: ForceReading) -> Observation:
+        row = self._episodes.observe(reading, 0)
+        return row if self.settings.obs_mode == "flat" else self._episodes.observer.entries(row)
 
 
-def single_spaces(fleet: Fleet, settings: Settings) -> tuple[spaces.Space[Any], spaces.Box]:
+def single_spaces(episodes: EpisodeBatch, settings: Settings) -> tuple[spaces.Space[Any], spaces.Box]:
     """Spaces of what one environment shows and takes."""
     flat = settings.obs_mode == "flat"
-    return fleet.observer.flat_space if flat else fleet.observer.dict_space, spaces.Box(
-        -1.0, 1.0, (fleet.body.actions,), np.float32
+    return episodes.observer.flat_space if flat else episodes.observer.dict_space, spaces.Box(
+        -1.0, 1.0, (episodes.body.actions,), np.float32
     )
 
 

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from ccr_gym.bodies import Body, Seen
 from ccr_gym.sensing import DELAYED
 from ccr_gym.settings import Settings
-from solver.layout import Layout
+from solver.common.layout import Layout
 
 FORCE_SCALE_N = 0.5  # force that an observation of 1 stands for
 AHEAD = (2, 4, 8)  # steps that a moving set-point is seen ahead
@@ -39,7 +39,7 @@ class Observer:
         told = {"desired_force": goal, "force_error": goal, "force_est": space}
         if task.moving:
             told["desired_ahead"] = len(AHEAD)
-        if settings.senses:
+        if settings.sensors:
             told["force_measured"] = space
         if body.obstacle_size:
             told["obstacle"] = body.obstacle_size

@@ -346,9 +346,9 @@ def draw_solid(canvas: Canvas, obstacle: Obstacle) -> None:
 
 def draw_wall(canvas: Canvas, wall: HalfPlane) -> None:
     """A half-plane, hatched all over."""
-    inward, along = surface_axes(wall)
+    inward, along = wall.axes
     reach = LAYOUT.horizon_mm
-    center = onto_surface(wall, canvas.camera.center)
+    center = wall.nearest(canvas.camera.center)
     canvas.polygon(surface_box(canvas, wall, center, 2 * reach, 0, reach), PALETTE.obstacle)
     for shift in np.arange(-2 * reach, reach, LAYOUT.hatch_mm):
         start = center + shift * along
@@ -358,7 +358,7 @@ def draw_wall(canvas: Canvas, wall: HalfPlane) -> None:
 
 def draw_load_cell(canvas: Canvas, cell: HalfPlane, equilibrium: Equilibrium) -> None:
     """A plate level with the nodes that can touch it, on a cell and its mount."""
-    center = onto_surface(cell, equilibrium.nodes[list(cell.nodes or ()), :2].mean(axis=0))
+    center = cell.nearest(equilibrium.nodes[list(cell.nodes or ()), :2].mean(axis=0))
     plate, thickness = LAYOUT.plate_mm, LAYOUT.plate_thickness_mm
     for width, near, far, color in (
         (0.30 * plate, thickness, thickness + 4, PALETTE.outline),
@@ -368,23 +368,11 @@ def draw_load_cell(canvas: Canvas, cell: HalfPlane, equilibrium: Equilibrium) ->
         canvas.polygon(surface_box(canvas, cell, center, width, near, far), color)
 
 
-def surface_axes(plane: HalfPlane) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors into a half-plane and along its surface, ``(2,)`` each."""
-    x, y = plane.normal
-    return np.array([-x, -y]), np.array([-y, x])
-
-
-def onto_surface(plane: HalfPlane, point: np.ndarray) -> np.ndarray:
-    """The point of a half-plane's surface nearest to a point, ``(2,)`` [mm]."""
-    inward, _ = surface_axes(plane)
-    return np.asarray(point - ((point - plane.point) @ inward) * inward)
-
-
 def surface_box(
     canvas: Canvas, plane: HalfPlane, center: np.ndarray, width: float, near: float, far: float
 ) -> np.ndarray:
     """Canvas corners of a rectangle behind a surface, from depth ``near`` to ``far`` [mm], ``(4, 2)``."""
-    inward, along = surface_axes(plane)
+    inward, along = plane.axes
     corners = ((-0.5, near), (0.5, near), (0.5, far), (-0.5, far))
     return canvas.camera([center + across * width * along + depth * inward for across, depth in corners])
 

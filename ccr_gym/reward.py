@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ccr_gym.checks import check_fields, check_number, checked
-from solver.operations import Operations
+from solver.common.operations import Operations
 
 MAX_WEIGHT = 1e6
 

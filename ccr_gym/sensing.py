@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccr_gym.checks import check_fields, check_range, checked
-from solver.validation import SMALLEST
+from solver.common.validation import SMALLEST
 
 if TYPE_CHECKING:
     from ccr_gym.bodies import Body
@@ -30,8 +30,8 @@ class Sensing:
         noise_n: Standard deviation of white noise on each component of the measured force [N].
         bias_n: Constant error of each component, in size [N].
         backlash_mm: Play between motor and cable: a reversal moves nothing until it is taken up [mm].
-        friction: Share of the cable load that friction takes before it is measured, unknown to the estimate.
-        stiffness: Rigidity of the robot over the one that is known; forces grow with it, shapes do not change.
+        tendon_loss: Share of the cable load that friction takes before it is measured, unknown to the estimate.
+        rigidity_ratio: Rigidity of the robot over the one that is known; forces grow with it, shapes do not change.
 
     Raises:
         ValueError: If a range is not two numbers, descends, or goes beyond what is possible.
@@ -41,18 +41,18 @@ class Sensing:
     noise_n: Range = checked((0.0005, 0.0015), check_range, low=0)
     bias_n: Range = checked((0.0, 0.003), check_range, low=0)
     backlash_mm: Range = checked((0.2, 0.6), check_range, low=0)
-    friction: Range = checked((0.0, 0.3), check_range, low=0, high=0.9)
-    stiffness: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
+    tendon_loss: Range = checked((0.0, 0.3), check_range, low=0, high=0.9)
+    rigidity_ratio: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
 
     def __post_init__(self) -> None:
         check_fields(self)
 
 
-class Senses:
+class SensorModel:
     """The motors and sensors of many robots.
 
     Attributes:
-        stiffness: Rigidity of each robot over the one that is known, ``(N,)``.
+        rigidity_ratio: Rigidity of each robot over the one that is known, ``(N,)``.
         grip: Share of each cable load that is measured, ``(N,)``.
 
     Args:
@@ -71,17 +71,17 @@ class Senses:
         self._motors = np.zeros((count, body.actions))
         self._rows = np.zeros((count, HISTORY, delayed.size))
         self._fresh = np.ones(count, bool)
-        self.stiffness, self.grip = np.ones(count), np.ones(count)
+        self.rigidity_ratio, self.measured_load_fraction = np.ones(count), np.ones(count)
 
     def begin(self, robot: int, generator: np.random.Generator, motors: Any) -> None:
         """Draw the motors and sensors of an episode, which starts with the motors at these places."""
         sensing, space = self._sensing, self._noise.shape[2]
-        latency, play, friction, stiffness, noise, *biases = generator.random(5 + space).tolist()
+        latency, play, loss, rigidity_ratio, noise, *biases = generator.random(5 + space).tolist()
         low, high = sensing.latency
         self._latency[robot] = low + int(latency * (high - low + 1))
         self._play[robot] = _between(sensing.backlash_mm, play)
-        self.grip[robot] = 1 - _between(sensing.friction, friction)
-        self.stiffness[robot] = math.exp(_between(tuple(map(math.log, sensing.stiffness)), stiffness))
+        self.measured_load_fraction[robot] = 1 - _between(sensing.tendon_loss, loss)
+        self.rigidity_ratio[robot] = math.exp(_between(tuple(map(math.log, sensing.rigidity_ratio)), rigidity_ratio))
         bias = [_between(sensing.bias_n, abs(2 * part - 1)) * math.copysign(1, part - 0.5) for part in biases]
         white = generator.normal(size=(NOISE_STEPS, space))
         self._noise[robot] = bias + _between(sensing.noise_n, noise) * white

@@ -18,8 +18,8 @@ from ccr_gym.checks import (
 from ccr_gym.reward import RewardWeights
 from ccr_gym.sensing import Sensing
 from solver import Robot
+from solver.common.validation import SMALLEST
 from solver.spatial import SpatialRobot
-from solver.validation import SMALLEST
 
 MAX_FRICTION = 10.0
 
@@ -49,7 +49,7 @@ class Settings:
         force_sensor: Whether the exact contact force is observed beside the virtual-work estimate.
         max_increment_mm: Cable increment of a full action [mm].
         cable_limit_mm: Largest cable displacement a policy can command [mm].
-        friction: Ratio μ of the virtual-work estimator (eq. 11), from 0 to 10.
+        estimator_friction: Ratio μ of the virtual-work estimator (eq. 11), from 0 to 10.
         force_limit: Contact force above which ``info["cost"]`` counts [N].
         weights: Weights of the reward terms; a mapping of names to numbers is taken as well.
         backend: ``"native"``, or ``"casadi"`` for the reference solver (slow).
@@ -67,7 +67,7 @@ class Settings:
     force_sensor: bool = checked(True, check_flag)
     max_increment_mm: float = checked(0.5, check_number, low=SMALLEST)
     cable_limit_mm: float = checked(14.0, check_number, low=SMALLEST)
-    friction: float = checked(0.0, check_number, low=0, high=MAX_FRICTION)
+    estimator_friction: float = checked(0.0, check_number, low=0, high=MAX_FRICTION)
     force_limit: float = checked(0.3, check_number, low=SMALLEST)
     weights: RewardWeights = nested(RewardWeights)
     backend: Literal["native", "casadi"] = checked("native", check_choice, choices=("native", "casadi"))
@@ -88,7 +88,7 @@ class Settings:
         )
 
     @property
-    def senses(self) -> Sensing | None:
+    def sensors(self) -> Sensing | None:
         """What is not ideal, if anything is."""
         if self.sensing == "realistic":
             return Sensing()
@@ -96,7 +96,7 @@ class Settings:
 
 
 def _insertable() -> Robot:
-    return Robot(length_mm=160.0, segments=18, offset_mm=8.0, cable="sliding", length_range_mm=(140.0, 180.0))
+    return Robot(length_mm=160.0, segments=18, offset_mm=8.0, model="rod", length_range_mm=(140.0, 180.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,11 +24,11 @@ from ccr_gym.checks import (
 )
 from ccr_gym.observation import FORCE_SCALE_N
 from solver import Circle, HalfPlane, Robot, Scene
-from solver.batch import BaseBatch
-from solver.scene import MAX_OBSTACLES
-from solver.solve import check_core
+from solver.common.batch import BaseBatch
+from solver.common.checks import check_core
+from solver.common.scene import MAX_OBSTACLES
+from solver.common.validation import SMALLEST
 from solver.spatial import Cylinder, SpatialRobot, Sphere
-from solver.validation import SMALLEST
 
 MAX_DRAWS = 1000
 HALF_CYLINDER_MM = 30.0
@@ -207,16 +207,16 @@ class SoftObstacle(PushObstacle):
     """A circular obstacle on a spring of unknown stiffness, which gives way when it is pushed.
 
     Attributes:
-        stiffness: Range of the spring's stiffness, drawn evenly in its logarithm [N/mm].
+        spring: Range of the spring's stiffness, drawn evenly in its logarithm [N/mm].
     """
 
-    stiffness: tuple[float, float] = checked((0.003, 0.1), check_range, low=SMALLEST)
+    spring: tuple[float, float] = checked((0.003, 0.1), check_range, low=SMALLEST)
 
     def draw(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """A scene and a desired force."""
         drawn = PushObstacle.draw(self, robot, generator)
-        (exponent,) = uniform(generator, (math.log(self.stiffness[0]), math.log(self.stiffness[1])))
-        return drawn._replace(scene=Scene(replace(o, stiffness=math.exp(exponent)) for o in drawn.scene))
+        (exponent,) = uniform(generator, (math.log(self.spring[0]), math.log(self.spring[1])))
+        return drawn._replace(scene=Scene(replace(o, spring=math.exp(exponent)) for o in drawn.scene))
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,7 +371,7 @@ def assign(
         names = [robots[k] for k in clear]
         forces = np.array([assignment.desired_force for assignment in drawn], float)
         pulls = np.array([assignment.pull for assignment in drawn])
-        found, reached = solver.reaches(names, forces, PROBE_MM, cable_limit_mm, pulls, task.target)
+        found, reached = solver.ramp_reaches_force(names, forces, PROBE_MM, cable_limit_mm, pulls, task.target)
         if task.force_vector:
             found &= np.linalg.norm(reached, axis=1) <= FORCE_SCALE_N
         desired[clear] = reached if task.force_vector else forces[:, None]

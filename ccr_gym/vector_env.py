@@ -21,10 +21,10 @@ from ccr_gym.checks import (
     require,
 )
 from ccr_gym.env import METADATA, Observation, make_settings, single_spaces
-from ccr_gym.fleet import Fleet, Truth
+from ccr_gym.episodes import EpisodeBatch, PrivilegedState
 from ccr_gym.reward import TERMS
 from ccr_gym.tasks import Task
-from solver.validation import is_listed, shown
+from solver.common.validation import is_listed, shown
 
 Infos = dict[str, Any]
 MAX_ENVS = 65_536
@@ -73,12 +73,12 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.max_episode_steps = check_whole("max_episode_steps", steps, low=1, high=MAX_STEPS)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
-        self._fleet = Fleet(task, self.settings, num_envs, threads)
-        self.single_observation_space, self.single_action_space = single_spaces(self._fleet, self.settings)
+        self._episodes = EpisodeBatch(task, self.settings, num_envs, threads)
+        self.single_observation_space, self.single_action_space = single_spaces(self._episodes, self.settings)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._shape = (num_envs, self._fleet.body.actions)
+        self._shape = (num_envs, self._episodes.body.actions)
         self._steps = np.zeros(num_envs, int)
         self._ended = np.zeros(num_envs, bool)
         self._started = False
@@ -107,9 +107,9 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._begin(np.flatnonzero(mask), generators)
         self._generators = generators
         self._started = True
-        reading = self._fleet.read()
+        reading = self._episodes.read()
         terms = tuple(np.zeros((len(TERMS), self.num_envs)))
-        return self._observation(self._fleet.observe(reading)), _masked(self._fleet.infos(reading, terms), mask)
+        return self._observation(self._episodes.observe(reading)), _masked(self._episodes.infos(reading, terms), mask)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Infos]:
         """Move the cables, and reset as the autoreset mode says.
@@ -121,21 +121,21 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         disabled = self.autoreset_mode is AutoresetMode.DISABLED
         if not self._started or (disabled and self._ended.any()):
             raise gymnasium.error.ResetNeeded("call reset() before step(), with a reset_mask after the end of episodes")
-        effort = self._fleet.body.effort(check_array("actions", actions, self._shape))
+        effort = self._episodes.body.effort(check_array("actions", actions, self._shape))
         resetting, everything = self._ended.copy(), np.ones(self.num_envs, bool)
         if resetting.any():
             self._begin(np.flatnonzero(resetting), self._generators)  # first: if no scene is found, nothing has moved
             moving = np.flatnonzero(~resetting)
-            self._fleet.step(effort[moving], moving.tolist())
+            self._episodes.step(effort[moving], moving.tolist())
         else:
-            self._fleet.step(effort)
+            self._episodes.step(effort)
         self._steps += ~resetting
-        reading = self._fleet.read()
-        terms = self._fleet.rewards(reading)
+        reading = self._episodes.read()
+        terms = self._episodes.rewards(reading)
         for term in terms:
             term[resetting] = 0.0
         truncated = self._steps >= self.max_episode_steps
-        rows, infos = self._fleet.observe(reading), self._fleet.infos(reading, terms)
+        rows, infos = self._episodes.observe(reading), self._episodes.infos(reading, terms)
         self._ended = truncated.copy()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and truncated.any():
             rows, infos = self._restart(truncated, rows, infos, terms)
@@ -145,24 +145,24 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         return self._observation(rows), rewards, np.zeros(self.num_envs, bool), truncated, infos
 
     @property
-    def truth(self) -> Truth:
+    def privileged_state(self) -> PrivilegedState:
         """What no agent sees, of all environments.
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
         """
-        self._check_started("truth")
-        return self._fleet.truth()
+        self._check_started("privileged_state")
+        return self._episodes.privileged_state()
 
     def probe(self, places: np.ndarray) -> np.ndarray:
-        """As :meth:`ccr_gym.fleet.Fleet.probe`.
+        """As :meth:`ccr_gym.episodes.EpisodeBatch.probe`.
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
             ValueError: If the places are not finite real numbers of the right shape.
         """
         self._check_started("probe")
-        return self._fleet.probe(check_array("places", places, self._shape))
+        return self._episodes.probe(check_array("places", places, self._shape))
 
     def _check_started(self, asked: str) -> None:
         if not self._started:
@@ -201,18 +201,18 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         told["_final_info"] = ended.copy()
         self._begin(np.flatnonzero(ended), self._generators)
         self._ended = np.zeros(self.num_envs, bool)
-        reading, everything = self._fleet.read(), np.ones(self.num_envs, bool)
+        reading, everything = self._episodes.read(), np.ones(self.num_envs, bool)
         fresh = tuple(np.where(ended, 0.0, term) for term in terms)
-        return self._fleet.observe(reading), _masked(self._fleet.infos(reading, fresh), everything) | told
+        return self._episodes.observe(reading), _masked(self._episodes.infos(reading, fresh), everything) | told
 
     def _begin(self, robots: np.ndarray, generators: list[np.random.Generator | None]) -> None:
         names = robots.tolist()
-        self._fleet.draw(names, [generator for i in names if (generator := generators[i]) is not None])
+        self._episodes.draw(names, [generator for i in names if (generator := generators[i]) is not None])
         self._steps[robots] = 0
         self._ended[robots] = False
 
     def _observation(self, rows: np.ndarray) -> Observation:
-        return rows if self.settings.obs_mode == "flat" else self._fleet.observer.entries(rows)
+        return rows if self.settings.obs_mode == "flat" else self._episodes.observer.entries(rows)
 
 
 def _autoreset_mode(mode: Any) -> AutoresetMode:

@@ -1,20 +1,30 @@
 """Exact optimisation kinematics of a cable-driven continuum robot among obstacles."""
 
-from solver.custom import Custom, Family
-from solver.equilibrium import Equilibrium, Optimality, Residuals
-from solver.obstacles import Capsule, Circle, Ellipse, HalfPlane, Obstacle, Polygon
-from solver.reference import ReferenceSolver
-from solver.robot import Robot
-from solver.scene import Scene
-from solver.solve import Solver
-from solver.status import Status
+from solver.cache.memo import TransitionMemo
+from solver.common.equilibrium import Optimality, Residuals
+from solver.common.obstacle import Extent, Obstacle
+from solver.common.scene import Scene
+from solver.common.status import Status
+from solver.common.trace import Trace
+from solver.planar.batch import BatchSolver
+from solver.planar.custom import Custom, Family
+from solver.planar.equilibrium import Equilibrium
+from solver.planar.forces import VirtualWork, force_true, onset_tension
+from solver.planar.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes
+from solver.planar.obstacles import Capsule, Circle, Ellipse, HalfPlane, Polygon
+from solver.planar.reference import ReferenceSolver
+from solver.planar.robot import Robot
+from solver.planar.sensitivity import Sensitivity, sensitivity
+from solver.planar.solve import Solver
 
 __all__ = [
+    "BatchSolver",
     "Capsule",
     "Circle",
     "Custom",
     "Ellipse",
     "Equilibrium",
+    "Extent",
     "Family",
     "HalfPlane",
     "Obstacle",
@@ -24,6 +34,18 @@ __all__ = [
     "Residuals",
     "Robot",
     "Scene",
+    "Sensitivity",
     "Solver",
     "Status",
+    "Trace",
+    "TransitionMemo",
+    "VirtualWork",
+    "clearance",
+    "fitted_slopes",
+    "force_true",
+    "free_nodes",
+    "free_tension",
+    "onset_tension",
+    "sensitivity",
+    "tip_slopes",
 ]

@@ -6,21 +6,12 @@ from types import ModuleType
 
 import casadi as ca
 
-for name, place in (
-    ("solver", "."),
-    ("solver.spatial", "spatial"),
-):  # packages that need the kernel that is being built
+for name in ("solver", "solver.spatial"):  # packages that need the kernel that is being built
     sys.modules[name] = package = ModuleType(name)
-    package.__path__ = [str(Path(__file__).parent / place)]
+    package.__path__ = [str(Path(__file__).parent.joinpath(*name.split(".")[1:]))]
 
-from solver.formulation import (  # noqa: E402
-    GAP_LAWS,
-    arc_function,
-    clearance_function,
-    disk_gap_function,
-    gap_function,
-    segment_function,
-)
+from solver.common.gap_laws import clearance_function, gap_function  # noqa: E402
+from solver.planar.formulation import GAP_LAWS, arc_function, disk_gap_function, segment_function  # noqa: E402
 from solver.spatial import formulation as spatial  # noqa: E402
 
 

@@ -25,8 +25,8 @@ RECORDED = Path(__file__).parent / "data" / "replay.json"
 SOLVER_STEPS, SINGLE_STEPS, VECTOR_STEPS, ENVS = 2500, 350, 90, 4
 INSERTED = replace(Robot.prototype(), length_range_mm=(160.0, 200.0), between=1)
 ROBOTS = {
-    "uniform": replace(Robot.prototype(), cable="uniform"),
-    "sliding": replace(Robot.prototype(), cable="sliding"),
+    "paper": replace(Robot.prototype(), model="paper"),
+    "rod": replace(Robot.prototype(), model="rod"),
     "insertion": INSERTED,
     "space": SpatialRobot.prototype(),
 }
@@ -110,7 +110,7 @@ def _sample_in_space(generator):
 
 
 def _mounted(spring):
-    return {} if spring is None else {"stiffness": float(spring)}
+    return {} if spring is None else {"spring": float(spring)}
 
 
 def _advance(solver, state, generator):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from agents.sb3_adapter import FleetVecEnv
+from agents.sb3_adapter import SB3VecEnv
 from agents.tuned import PPO_IDEAL
 from ccr_gym import ENV_IDS
 
@@ -46,6 +46,6 @@ def test_the_settings_for_the_zoo_are_those_for_ideal_sensing(env_id):
     assert told.pop("learning_rate") == f"lin_{config.learning_rate}"
     told["policy_kwargs"] = eval(told["policy_kwargs"])
     assert told["policy_kwargs"] == {"net_arch": [config.width] * 2, "log_std_init": config.log_std_init}
-    model = PPO(env=FleetVecEnv(env_id, 1), device="cpu", **told | {"batch_size": told["n_steps"]})
+    model = PPO(env=SB3VecEnv(env_id, 1), device="cpu", **told | {"batch_size": told["n_steps"]})
     assert (model.n_steps, told["batch_size"], model.n_epochs) == (config.rollout, config.batch_size, config.epochs)
     assert (model.gamma, model.gae_lambda) == (config.gamma, config.gae_lambda)

@@ -10,16 +10,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from timeit import timeit
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
-from solver import Circle, Equilibrium, Robot, Scene, Solver, Status
-from solver.batch import BatchSolver
-from solver.free import clearance
-from solver.layout import CABLE
-from solver.memo import TransitionMemo
-from solver.reference import ReferenceSolver
+from solver import (
+    BatchSolver,
+    Circle,
+    Equilibrium,
+    ReferenceSolver,
+    Robot,
+    Scene,
+    Solver,
+    Status,
+    TransitionMemo,
+    clearance,
+)
 
 STEPS_PER_SCENE = 100
 LARGEST_CABLE = 14.0  # [mm]
@@ -100,7 +106,7 @@ def reference_times(steps: list[PlanarStep]) -> tuple[np.ndarray, np.ndarray]:
 
 
 PUSHED = Circle(center=(44, 104), radius=15)  # of the paper's Fig. 4a
-SPRUNG = Circle(center=(44, 104), radius=15, stiffness=1.0)
+SPRUNG = Circle(center=(44, 104), radius=15, spring=1.0)
 PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25)])
 
 
@@ -116,10 +122,10 @@ def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
 FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(31)]
 
 
-def cost(obstacles: list[Circle], cable: str = "uniform", repeats: int = 40) -> float:
-    """Time of a path among obstacles over that with one and a uniform cable; medians of runs side by side."""
+def cost(obstacles: list[Circle], model: Literal["paper", "rod"] = "paper", repeats: int = 40) -> float:
+    """Time of a path among obstacles over that with one and the paper's model; medians of runs side by side."""
     plain = Solver(Robot.prototype(), Scene([PUSHED]))
-    other = Solver(replace(Robot.prototype(), cable=cable), Scene(obstacles))
+    other = Solver(replace(Robot.prototype(), model=model), Scene(obstacles))
     times = np.array([(path_times(plain), path_times(other)) for _ in range(repeats)])
     mean_plain, mean_other = np.median(times, axis=0).mean(axis=1)
     return float(mean_other / mean_plain)
@@ -169,7 +175,7 @@ def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
     records = []
     for k in range(steps):
         drift = generator.uniform(-0.5, 0.5, count) + (DRIFT if k % 100 < 80 else -3 * DRIFT)
-        commands = np.clip(batches[0].blocks[:, CABLE] + drift, 0, LARGEST_CABLE)
+        commands = np.clip(batches[0].layout.cables(batches[0].blocks)[:, 0] + drift, 0, LARGEST_CABLE)
         if k % 10 == 0:
             records.append((k, [batches[0].equilibrium(i) for i in range(count)], commands.tolist()))
         for column, batch in enumerate(batches, start=1):
@@ -211,7 +217,7 @@ def measure(steps: int, rivals: int) -> dict[str, Any]:
         "ipopt_ratio": float(np.median(reference / kernel)),
         "segments_mean_us": {str(n): mean for n, mean in means.items()},
         "growth_exponent": float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0]),
-        "sliding_ratio": cost([PUSHED], cable="sliding"),
+        "sliding_ratio": cost([PUSHED], model="rod"),
         "obstacles_ratio": {str(n): cost([PUSHED, *FAR[: n - 1]]) for n in (2, 11, 32)},
         "spring_ratio": cost([SPRUNG]),
         "cold_ratio": cold_ratio(),

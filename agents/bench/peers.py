@@ -202,7 +202,7 @@ class MujocoChain:
 
 def sliding_robot() -> Robot:
     """The prototype with a sliding cable and no limit of tension."""
-    return replace(Robot.prototype(max_tension=math.inf), cable="sliding")
+    return replace(Robot.prototype(max_tension=math.inf), model="rod")
 
 
 def free_tip_error(cable_mm: float = 8.0) -> float:

@@ -17,7 +17,7 @@ from agents.actor import LearnedPolicy
 from agents.config import EVALUATION_SEED, TrainConfig
 from agents.evaluate import run_episodes
 from agents.learners import learner, scaled
-from agents.sb3_adapter import FleetVecEnv
+from agents.sb3_adapter import SB3VecEnv
 from agents.training import train
 from agents.tuned import PPO_IDEAL
 
@@ -25,7 +25,7 @@ OURS, PEER = "CCR/PushObstacle-v0", "Pendulum-v1"
 ROUNDS = 7  # of which the median counts
 
 
-class IdleVecEnv(FleetVecEnv):
+class IdleVecEnv(SB3VecEnv):
     """The same spaces and the same episodes, in which nothing happens: what the learner costs by itself."""
 
     def __init__(self, env_id: str, n_envs: int) -> None:
@@ -112,7 +112,7 @@ def learning(steps: int = 40_960) -> dict[str, float]:
     """Frames a second of PPO on the bare observation, on our environment and on the idle one."""
     torch.set_num_threads(1)
     config, count = TrainConfig(sensing="ideal", learner=PPO_IDEAL), PPO_IDEAL.envs
-    environments = {"ours": FleetVecEnv(OURS, count, 0), "idle": IdleVecEnv(OURS, count)}
+    environments = {"ours": SB3VecEnv(OURS, count, 0), "idle": IdleVecEnv(OURS, count)}
     models = {name: learner(scaled(VecMonitor(bare), config), config) for name, bare in environments.items()}
     found = rates({name: _learn(model, steps) for name, model in models.items()})
     return {

@@ -1,9 +1,11 @@
 """The robot in space (eq. 13): two cables, and obstacles all around."""
 
 from solver.spatial.equilibrium import SpatialEquilibrium
-from solver.spatial.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
+from solver.spatial.forces import SpatialVirtualWork, force_true
+from solver.spatial.obstacles import Box, Capsule, Cylinder, HalfSpace, SpatialObstacle, Sphere
 from solver.spatial.reference import SpatialReferenceSolver
 from solver.spatial.robot import SpatialRobot
+from solver.spatial.sensitivity import SpatialSensitivity, spatial_sensitivity
 from solver.spatial.solve import SpatialBatchSolver, SpatialSolver
 
 __all__ = [
@@ -13,8 +15,13 @@ __all__ = [
     "HalfSpace",
     "SpatialBatchSolver",
     "SpatialEquilibrium",
+    "SpatialObstacle",
     "SpatialReferenceSolver",
     "SpatialRobot",
+    "SpatialSensitivity",
     "SpatialSolver",
+    "SpatialVirtualWork",
     "Sphere",
+    "force_true",
+    "spatial_sensitivity",
 ]

@@ -7,10 +7,11 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from solver.equilibrium import BaseEquilibrium
-from solver.formulation import GapLaw, first_derivatives
-from solver.geometry import divided
-from solver.layout import SPACE, Layout, make_layout
+from solver.common.equilibrium import BaseEquilibrium
+from solver.common.gap_laws import GapLaw
+from solver.common.geometry import divided
+from solver.common.layout import SPACE, Layout, make_layout
+from solver.common.node_problem import first_derivatives
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
 
@@ -20,7 +21,8 @@ class SpatialEquilibrium(BaseEquilibrium):
     """One equilibrium of a robot among obstacles in space; a step starts from it and needs nothing else.
 
     Frame: base at the origin, unactuated backbone along +z, first cable on the +x side. The lines of points that can
-    touch are those of ``robot.lines_mm``. The attributes are those of :class:`solver.equilibrium.BaseEquilibrium`.
+    touch are those of ``robot.lines_mm``. The attributes are those of
+    :class:`~solver.common.equilibrium.BaseEquilibrium`.
     """
 
     robot_kind: ClassVar[type] = SpatialRobot
@@ -105,5 +107,5 @@ def spatial_layout(robot: SpatialRobot, obstacles: int) -> Layout:
 
 @lru_cache(maxsize=32)
 def _node_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
-    """:func:`~solver.formulation.first_derivatives` of :func:`spatial_problem`."""
+    """:func:`~solver.common.node_problem.first_derivatives` of :func:`spatial_problem`."""
     return first_derivatives(spatial_problem(robot, laws, mounted))

@@ -1,4 +1,4 @@
-"""Contact force in space, read in two ways; see :mod:`solver.forces`.
+"""Contact force in space, read in two ways; see :mod:`solver.planar.forces`.
 
 The energy force is that of the model, in any direction. The paper's virtual work is of the plane: one cable, one angle.
 Here it goes beyond the paper, to two cables. The free tip has one virtual displacement for each, and along both the
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.common.validation import finite, instance
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import sides
-from solver.validation import finite, instance
 
 TINY = 1e-300  # keeps quotients defined where nothing pushes
 

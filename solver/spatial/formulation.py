@@ -11,17 +11,8 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from solver.formulation import (
-    TINY,
-    GapLaw,
-    NodeProblem,
-    capsule_gap,
-    circle_gap,
-    divided,
-    gaps_of,
-    half_plane_gap,
-    norms,
-)
+from solver.common.gap_laws import TINY, GapLaw, capsule_gap, circle_gap, gaps_of, half_plane_gap
+from solver.common.node_problem import NodeProblem, divided, norms
 
 if TYPE_CHECKING:  # the build runs this file without the package
     from solver.spatial.robot import SpatialRobot

@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.formulation import GapLaw
-from solver.obstacles import Extent, Obstacle
+from solver.common.gap_laws import GapLaw
+from solver.common.obstacle import Extent, Obstacle
+from solver.common.validation import SMALLEST, Point, direction, point, positive
 from solver.spatial.formulation import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
-from solver.validation import SMALLEST, Point, direction, point, positive
 
 PARALLEL = 1e-6  # sine of the least angle between the axes of a box
 

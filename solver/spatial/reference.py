@@ -6,16 +6,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from solver.geometry import touchable_points
-from solver.layout import SPACE
-from solver.reference import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
-from solver.scene import Scene
-from solver.solve import check_clear, check_core, check_scene
+from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.geometry import touchable_points
+from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
+from solver.common.layout import SPACE
+from solver.common.scene import Scene
+from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
 from solver.spatial.solve import check_cables
-from solver.status import Status
 
 
 class SpatialReferenceSolver:
@@ -86,14 +86,14 @@ class SpatialReferenceSolver:
         slack = SLACK * self.robot.offset_mm
         if np.abs(cables).max() < slack or (not start.contact.any() and free.gaps.min(initial=1.0) > 0):
             return free
-        unknowns, _, _, pushes = start.node_solution()
+        unknowns, _, _, multipliers = start.node_solution()
         unit = np.abs(cables).max() / (self.robot.segments * self.robot.offset_mm)
         parameters = np.array([*cables, self.robot.length_mm, self.robot.rigidity, *self.scene.parameters])
         bounded = self._touchable[:, :, 1:].ravel()
         zeros = np.zeros(self._equalities)
         solution = self._ipopt(
             x0=unknowns,
-            lam_g0=np.r_[zeros, -pushes / unit**2],
+            lam_g0=np.r_[zeros, -multipliers / unit**2],
             p=np.r_[parameters, unit],
             lbg=np.r_[zeros, np.where(bounded, 0.0, -np.inf)],
             ubg=np.r_[zeros, np.full(bounded.size, np.inf)],
@@ -109,7 +109,7 @@ class SpatialReferenceSolver:
         held = -multipliers[self._equalities :]
         held[held < np.abs(solution["g"].full().ravel()[self._equalities :])] = 0.0  # what the barrier left
         slopes = unit**2 * self._cable_slopes(reached, parameters, multipliers).full().ravel()
-        tensions = sides(cables) * slopes * self.robot.stiffness
+        tensions = sides(cables) * slopes * self.robot.energy_scale
         n = self.robot.segments
         nodes, first, second = (np.vstack([np.zeros(3), part]) for part in reached[: 9 * n].reshape(3, n, 3))
         disks = np.stack([first[1:] - nodes[1:], second[1:] - nodes[1:]], axis=1)  # (n, 2, 3)
@@ -139,7 +139,7 @@ class SpatialReferenceSolver:
         nodes[1:] = length * np.cumsum(np.sin(middles)[:, None] * direction + np.cos(middles)[:, None] * up, axis=0)
         half_sines = cables / (2 * n * self.robot.offset_mm)
         slopes = 4 * np.arcsin(half_sines) / np.sqrt(1 - half_sines**2) / self.robot.offset_mm
-        tensions = sides(cables) * self.robot.stiffness * slopes
+        tensions = sides(cables) * self.robot.energy_scale * slopes
         return self._equilibrium(cables, tensions, nodes, frames, None, None, 0)
 
     def _equilibrium(
@@ -148,7 +148,7 @@ class SpatialReferenceSolver:
         tensions: np.ndarray,
         nodes: np.ndarray,
         frames: np.ndarray,
-        pushes: np.ndarray | None,
+        multipliers: np.ndarray | None,
         mounts: np.ndarray | None,
         iterations: int,
     ) -> SpatialEquilibrium:
@@ -160,14 +160,14 @@ class SpatialReferenceSolver:
         places.tensions(block)[:] = tensions
         places.coordinates(block)[:] = _controls(nodes, frames)
         places.nodes(block)[:], places.frames(block)[:] = nodes, frames
-        if pushes is not None and mounts is not None:
-            places.multipliers(block)[:, :, 1:] = pushes.reshape(self._touchable[:, :, 1:].shape)
+        if multipliers is not None and mounts is not None:
+            places.multipliers(block)[:, :, 1:] = multipliers.reshape(self._touchable[:, :, 1:].shape)
             places.displacements(block)[list(self.scene.mounted)] = mounts.reshape(-1, 3)
         points = touching_points(self.robot, nodes, frames)
         for j, (obstacle, moved) in enumerate(zip(self.scene, places.displacements(block), strict=True)):
             places.gaps(block)[j] = np.where(self._touchable[j], obstacle.gap(points - moved), np.inf)
             pushed = places.multipliers(block)[j, ..., None] * obstacle.normal_at(points - moved)
-            places.forces(block)[j] = self.robot.stiffness * pushed.sum(axis=(0, 1))
+            places.forces(block)[j] = self.robot.energy_scale * pushed.sum(axis=(0, 1))
         places.force(block)[:] = places.forces(block).sum(axis=0)
         places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
         places.flags(block)[:] = (places.multipliers(block) > 0).any(axis=0).ravel()

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.robot import check_cable, check_numbers, check_points, check_scale
-from solver.validation import finite, whole
+from solver.common.robot import check_cable, check_numbers, check_points, check_scale
+from solver.common.validation import finite, whole
 
 LINES = ("backbone", "holes", "rim")
 LEAST_SINE = math.sin(math.radians(30) - 1e-9)  # of the angle between the cables
@@ -141,6 +141,6 @@ class SpatialRobot:
         return tuple(((segment + stretched) / (self.between + 1)).tolist())
 
     @property
-    def stiffness(self) -> float:
+    def energy_scale(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective [rad²] into energy."""
         return self.rigidity / (2 * self.segment_mm)

@@ -1,20 +1,24 @@
-"""How an equilibrium in space changes with its cables, its length and its obstacles; see :mod:`solver.sensitivity`."""
+"""How an equilibrium in space changes with its cables, its length and its obstacles.
+
+The method is that of :mod:`solver.planar.sensitivity`.
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
-from solver.formulation import GapLaw, second_derivatives
-from solver.scene import MAX_OBSTACLES
-from solver.sensitivity import respond
+from solver.common.gap_laws import GapLaw
+from solver.common.implicit import respond
+from solver.common.node_problem import second_derivatives
+from solver.common.scene import MAX_OBSTACLES
+from solver.common.validation import instance, whole
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.formulation import spatial_problem
 from solver.spatial.robot import SpatialRobot, sides
-from solver.validation import instance, whole
 
-CABLES, LENGTH = slice(0, 2), 2  # rows of a SpatialSensitivity
 MOTIONS = 7  # of an obstacle
 
 
@@ -36,6 +40,9 @@ class SpatialSensitivity:
         displacements: Of how far each obstacle has been pushed, ``(q, m, 3)`` [mm per unit].
     """
 
+    CABLES: ClassVar[slice] = slice(0, 2)
+    LENGTH: ClassVar[int] = 2
+
     nodes: np.ndarray
     turns: np.ndarray
     multipliers: np.ndarray
@@ -43,15 +50,15 @@ class SpatialSensitivity:
     forces: np.ndarray
     displacements: np.ndarray
 
+    @staticmethod
+    def obstacle_rows(obstacle: int) -> slice:
+        """Return the rows that belong to an obstacle: three shifts, three turns, radius.
 
-def obstacle_rows(obstacle: int) -> slice:
-    """Rows of a :class:`SpatialSensitivity` that belong to an obstacle: three shifts, three turns, radius.
-
-    Raises:
-        ValueError: If it is not the index of an obstacle.
-    """
-    obstacle = whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
-    return slice(3 + MOTIONS * obstacle, 3 + MOTIONS * (obstacle + 1))
+        Raises:
+            ValueError: If it is not the index of an obstacle.
+        """
+        obstacle = whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
+        return slice(3 + MOTIONS * obstacle, 3 + MOTIONS * (obstacle + 1))
 
 
 def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | None = None) -> SpatialSensitivity:
@@ -72,10 +79,10 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
         raise ValueError("cables_mm is (0, 0); one must be pulled, for the shear to be determined")
     change = respond(equilibrium, _kkt_derivatives(robot, scene.laws, scene.mounted), active, [])
     loads = change.loads
-    loads[LENGTH] -= change.load / equilibrium.length_mm  # of the stiffness, EI·n / 2 L0
+    loads[SpatialSensitivity.LENGTH] -= change.load / equilibrium.length_mm  # of the energy scale, EI·n / 2 L0
     for slopes in (change.unknowns, change.multipliers, loads):
         for j, obstacle in enumerate(scene):
-            shifts, turns = np.split(slopes[obstacle_rows(j)][:6], 2)
+            shifts, turns = np.split(slopes[SpatialSensitivity.obstacle_rows(j)][:6], 2)
             turns += np.tensordot(-np.cross(np.eye(3), obstacle.extent.center), shifts, axes=1)
     forces = loads[:, 3:].reshape(len(loads), len(scene), MOTIONS)[:, :, :3]
     displacements = np.zeros_like(forces)
@@ -88,8 +95,8 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
         nodes=nodes[0],
         turns=_turns(equilibrium, nodes[1:] - nodes[0], pulled),
         multipliers=change.multipliers,
-        tensions=equilibrium.stiffness * pulled * loads[:, CABLES],
-        forces=equilibrium.stiffness * forces,
+        tensions=equilibrium.energy_scale * pulled * loads[:, SpatialSensitivity.CABLES],
+        forces=equilibrium.energy_scale * forces,
         displacements=displacements,
     )
 
@@ -105,6 +112,6 @@ def _turns(equilibrium: SpatialEquilibrium, disks: np.ndarray, pulled: np.ndarra
 
 @lru_cache(maxsize=32)
 def _kkt_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
-    """:func:`~solver.formulation.second_derivatives` of :func:`spatial_problem`."""
+    """:func:`~solver.common.node_problem.second_derivatives` of :func:`spatial_problem`."""
     change = ca.MX.sym("change", 3 + MOTIONS * len(laws))
     return second_derivatives(spatial_problem(robot, laws, mounted, change), change)

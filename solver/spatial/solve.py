@@ -5,15 +5,17 @@ from typing import ClassVar
 import numpy as np
 
 from solver import _kernel
-from solver.batch import BaseBatch
-from solver.equilibrium import Optimality
-from solver.layout import SPACE, Layout, Model
-from solver.scene import Scene
-from solver.solve import Trace, check_clear, check_core, check_origin, check_scene, read_trace, scene_arrays
+from solver.common.batch import BaseBatch
+from solver.common.checks import check_clear, check_core, check_origin, check_scene
+from solver.common.equilibrium import Optimality
+from solver.common.kernel_input import scene_arrays
+from solver.common.layout import SPACE, Layout, Model
+from solver.common.scene import Scene
+from solver.common.status import Status
+from solver.common.trace import Trace, read_trace
+from solver.common.validation import number, sequence, shown
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.robot import SpatialRobot
-from solver.status import Status
-from solver.validation import number, sequence, shown
 
 
 class SpatialSolver:
@@ -86,6 +88,17 @@ class SpatialSolver:
         check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
         return Optimality(*self._kernel.optimality(equilibrium.block))
 
+    def check_command(
+        self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
+    ) -> tuple[float, ...]:
+        """Return a command as floats.
+
+        Raises:
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is something else.
+        """
+        return tuple(check_cables(self.robot, self.scene, equilibrium, cables_mm).tolist())
+
     def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
         reached = np.empty_like(block)
         first, second = cables.tolist()
@@ -94,7 +107,7 @@ class SpatialSolver:
 
 
 class SpatialBatchSolver(BaseBatch):
-    """Many robots in space, each moved as :class:`SpatialSolver` would; see :class:`solver.batch.BaseBatch`."""
+    """Many robots in space, each moved as :class:`SpatialSolver` would; see :class:`solver.common.batch.BaseBatch`."""
 
     model: ClassVar[Model] = SPACE
     robot_kind: ClassVar[type] = SpatialRobot
@@ -107,7 +120,7 @@ class SpatialBatchSolver(BaseBatch):
     def _make_layout(self, obstacles: int) -> Layout:
         return spatial_layout(self.robot, obstacles)
 
-    def _make_fleet(self, obstacles: int, threads: int) -> _kernel.SpatialFleet:
+    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialFleet:
         return _kernel.SpatialFleet(kernel_robot(self.robot), self.count, obstacles, threads)
 
     def _kernel_scene(self, scene: Scene) -> _kernel.SpatialScene:

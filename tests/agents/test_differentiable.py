@@ -4,8 +4,7 @@ import pytest
 import torch
 
 from agents.differentiable import differentiable
-from solver import Circle, Robot, Scene, Solver, Status
-from solver.sensitivity import CABLE, LENGTH, obstacle_rows
+from solver import Circle, Robot, Scene, Sensitivity, Solver, Status
 
 
 @pytest.fixture
@@ -35,12 +34,12 @@ def test_gradients(solver):
 
 
 def test_gradients_in_every_command_and_the_place_of_an_obstacle():
-    robot = Robot(length_mm=180, segments=18, offset_mm=8, cable="sliding", length_range_mm=(170, 190))
-    rows = (CABLE, LENGTH, obstacle_rows(0).start)
+    robot = Robot(length_mm=180, segments=18, offset_mm=8, model="rod", length_range_mm=(170, 190))
+    rows = (Sensitivity.CABLE, Sensitivity.LENGTH, Sensitivity.obstacle_rows(0).start)
 
     def solved(values):
         cable, length, x = values.tolist()
-        solver = Solver(robot, Scene([Circle(center=(x, 104), radius=15, stiffness=1.0)]))
+        solver = Solver(robot, Scene([Circle(center=(x, 104), radius=15, spring=1.0)]))
         equilibrium = solver.rest()
         for part in range(1, 11):
             equilibrium = solver.step(equilibrium, cable * part / 10, 180 + (length - 180) * part / 10)

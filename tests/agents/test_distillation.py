@@ -9,7 +9,7 @@ from agents.distillation import REACHED_N, teach
 from agents.evaluate import scores
 from agents.memory import MemoryVecEnv
 from agents.newton import NewtonController
-from agents.sb3_adapter import FleetVecEnv
+from agents.sb3_adapter import SB3VecEnv
 from agents.training import train
 from agents.tuned import DistilledSettings
 from ccr_gym import ENV_IDS
@@ -17,22 +17,22 @@ from ccr_gym import ENV_IDS
 
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
 def test_the_teacher_is_exact_and_moves_nothing_by_trying(env_id):
-    envs = MemoryVecEnv(FleetVecEnv(env_id, 6, 40, obs_mode="dict", sensing="realistic"))
+    envs = MemoryVecEnv(SB3VecEnv(env_id, 6, 40, obs_mode="dict", sensing="realistic"))
     envs.reset()
     for _ in range(62):
-        before = envs.get_attr("truth", [0])[0]
+        before = envs.get_attr("privileged_state", [0])[0]
         actions = teach(envs, envs.shown)
-        after = envs.get_attr("truth", [0])[0]
+        after = envs.get_attr("privileged_state", [0])[0]
         assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
         assert np.abs(actions).max() <= 1
         envs.step(actions)
-    truth = envs.get_attr("truth", [0])[0]
+    truth = envs.get_attr("privileged_state", [0])[0]
     missed = np.abs(np.linalg.norm(truth.force, axis=1) - truth.goal)
     assert np.median(missed) < (0.005 if "Track" in env_id else 1e-4)
 
 
 def test_the_teacher_does_what_newtons_controller_does():
-    envs = MemoryVecEnv(FleetVecEnv("CCR/PushObstacle-v0", 1, 8, obs_mode="dict", sensing="realistic"))
+    envs = MemoryVecEnv(SB3VecEnv("CCR/PushObstacle-v0", 1, 8, obs_mode="dict", sensing="realistic"))
     env, controller = (
         make("CCR/PushObstacle-v0", sensing="realistic", disable_env_checker=True),
         NewtonController.knowing(),
@@ -42,7 +42,7 @@ def test_the_teacher_does_what_newtons_controller_does():
     controller.reset(env)
     for _ in range(40):
         taught, known = teach(envs, envs.shown)[0], controller.act(observation)
-        if abs(np.linalg.norm(env.unwrapped.truth.force) - env.unwrapped.truth.goal) < REACHED_N:
+        if abs(np.linalg.norm(env.unwrapped.privileged_state.force) - env.unwrapped.privileged_state.goal) < REACHED_N:
             break
         assert taught == pytest.approx(known, abs=0.02)  # the slope of a trial move is not that at a point
         envs.step(known[None])

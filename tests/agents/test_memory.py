@@ -4,9 +4,8 @@ import pytest
 from gymnasium import spaces
 
 from agents.memory import DECAYS, MOVES, Memory, MemoryVecEnv
-from agents.sb3_adapter import FleetVecEnv
-from ccr_gym import ENV_IDS
-from ccr_gym.settings import Settings
+from agents.sb3_adapter import SB3VecEnv
+from ccr_gym import ENV_IDS, Settings
 
 
 def memory():
@@ -60,7 +59,7 @@ def test_errors_fade_at_their_rates_and_moves_pass_by():
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
 def test_vectors_remember_as_single_environments_do(env_id):
     told = {"sensing": "realistic", "split": "train"}
-    envs = MemoryVecEnv(FleetVecEnv(env_id, 2, 5, obs_mode="dict", **told))
+    envs = MemoryVecEnv(SB3VecEnv(env_id, 2, 5, obs_mode="dict", **told))
     env = gymnasium.make(env_id, disable_env_checker=True, **told)
     alone, generator = Memory(env.observation_space, 1, env.unwrapped.settings), np.random.default_rng(0)
     rows, (observation, _) = envs.reset(), env.reset(seed=6)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from agents.policy import set_points
-from ccr_gym.observation import AHEAD, FORCE_SCALE_N
+from ccr_gym import AHEAD, FORCE_SCALE_N
 
 
 def test_set_points_stay_as_they_are_unless_they_are_previewed():

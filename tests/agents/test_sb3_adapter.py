@@ -8,13 +8,13 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 import ccr_gym  # noqa: F401 - registers the ids
-from agents.sb3_adapter import FleetVecEnv
+from agents.sb3_adapter import SB3VecEnv
 
 ENV_ID, COUNT = "CCR/PushObstacle-v0", 4
 
 
 def test_equals_the_environments_that_sb3_makes():
-    ours = FleetVecEnv(ENV_ID, COUNT, seed=5)
+    ours = SB3VecEnv(ENV_ID, COUNT, seed=5)
     theirs = DummyVecEnv([lambda: gymnasium.make(ENV_ID, obs_mode="flat", disable_env_checker=True)] * COUNT)
     theirs.seed(5)
     assert ours.observation_space == theirs.observation_space
@@ -39,7 +39,7 @@ def test_equals_the_environments_that_sb3_makes():
 
 
 def test_monitor_and_learner_take_it():
-    environments = VecMonitor(FleetVecEnv(ENV_ID, COUNT, seed=0))
+    environments = VecMonitor(SB3VecEnv(ENV_ID, COUNT, seed=0))
     PPO("MlpPolicy", environments, n_steps=64, batch_size=64, n_epochs=1, device="cpu").learn(256)
     environments.reset()
     for _ in range(64):
@@ -48,7 +48,7 @@ def test_monitor_and_learner_take_it():
 
 
 def test_attributes_are_those_of_all():
-    environments = FleetVecEnv(ENV_ID, COUNT)
+    environments = SB3VecEnv(ENV_ID, COUNT)
     assert environments.get_attr("autoreset_mode") == [AutoresetMode.SAME_STEP] * COUNT
     assert environments.get_attr("max_episode_steps", [1, 2]) == [64, 64]
     assert environments.env_is_wrapped(gymnasium.Wrapper) == [False] * COUNT

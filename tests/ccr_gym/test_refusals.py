@@ -74,8 +74,8 @@ def scenes_of(env_id):
         ("CCR/BracedPush-v0", {"goal_mm": ((52, 72), (125, 150), (0, 16))}, r"goal_mm\[2\] is"),
         ("CCR/BracedPush-v0", {"goal_mm": ((52, 72), (125, 150))}, "3 ranges of two numbers"),
         ("CCR/BracedPush-v0", {"brace_mm": ((27, 38), (75, 95), (1, 14))}, "could slip"),
-        ("CCR/SoftObstacle-v0", {"stiffness": (0, 0.1)}, "stiffness is"),
-        ("CCR/SoftObstacle-v0", {"stiffness": (0.1, INF)}, "stiffness is"),
+        ("CCR/SoftObstacle-v0", {"spring": (0, 0.1)}, "spring is"),
+        ("CCR/SoftObstacle-v0", {"spring": (0.1, INF)}, "spring is"),
         ("CCR/InsertAndPush-v0", {"y_mm": (130, 75)}, "y_mm is"),
         ("CCR/SpatialPush-v0", {"cylinders": 7}, "cylinders is 7; it must be a number from 0 to 1"),
         ("CCR/SpatialPush-v0", {"tilt": -0.1}, "tilt is"),
@@ -101,13 +101,13 @@ def test_tasks_are_refused(env_id, task, message):
         ({"weights": {"effort": -1}}, "effort is -1"),
         ({"weights": {"approach": "much"}}, "approach is 'much'"),
         ({"weights": {"accuracy": True}}, "accuracy is True"),
-        ({"friction": NAN}, "friction is nan; it must be a number from 0 to 10"),
-        ({"friction": INF}, "friction is inf"),
-        ({"friction": -5}, "friction is -5"),
-        ({"friction": 0.1j}, "friction is"),
-        ({"sensing": {"stiffness": (1, INF)}}, "stiffness is"),
-        ({"sensing": {"stiffness": (0, 1)}}, "stiffness is"),
-        ({"sensing": {"friction": (0, 1)}}, "friction is.*from 0 to 0.9"),
+        ({"estimator_friction": NAN}, "estimator_friction is nan; it must be a number from 0 to 10"),
+        ({"estimator_friction": INF}, "estimator_friction is inf"),
+        ({"estimator_friction": -5}, "estimator_friction is -5"),
+        ({"estimator_friction": 0.1j}, "estimator_friction is"),
+        ({"sensing": {"rigidity_ratio": (1, INF)}}, "rigidity_ratio is"),
+        ({"sensing": {"rigidity_ratio": (0, 1)}}, "rigidity_ratio is"),
+        ({"sensing": {"tendon_loss": (0, 1)}}, "tendon_loss is.*from 0 to 0.9"),
         ({"sensing": {"latency": (0, 8)}}, "latency is.*whole numbers from 0 to 7"),
         ({"sensing": {"latency": (False, 1)}}, "latency is"),
         ({"sensing": {"latency": 3}}, "latency is 3"),
@@ -196,12 +196,12 @@ def test_numpy_numbers_are_numbers():
         count=np.int64(2),
         threads=np.int32(4 * (os.cpu_count() or 1)),
         max_episode_steps=np.uint8(9),
-        friction=np.float32(0.5),
+        estimator_friction=np.float32(0.5),
         force_sensor=np.bool_(False),
         task={"radius_mm": np.array([12, 13]), "force_n": [np.float64(0.1), np.float32(0.25)]},
     )
     assert env.reset(seed=np.uint16(3))[0]["nodes"].shape == (2, 57)
-    assert (env.max_episode_steps, env.settings.friction, env.settings.force_sensor) == (9, 0.5, False)
+    assert (env.max_episode_steps, env.settings.estimator_friction, env.settings.force_sensor) == (9, 0.5, False)
     assert env.task.radius_mm == (12.0, 13.0)
     assert all(type(end) is float for end in env.task.force_n)
 
@@ -452,7 +452,7 @@ def test_nothing_is_asked_before_a_reset_and_closing_is_harmless(env_id):
     for build in (make, make_vec):
         env = build(env_id).unwrapped
         places = np.zeros(env.action_space.shape)
-        for ask in (lambda env=env, places=places: env.probe(places), lambda env=env: env.truth):
+        for ask in (lambda env=env, places=places: env.probe(places), lambda env=env: env.privileged_state):
             with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
                 ask()
         env.reset(seed=0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ccr_gym.reward import TERMS, RewardWeights, reward_terms
-from solver.operations import ARRAYS, NUMBERS
+from solver.common.operations import ARRAYS, NUMBERS
 
 
 def terms(force, desired=0.1, clearance=0.0, effort=0.0):

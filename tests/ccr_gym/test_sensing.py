@@ -10,7 +10,9 @@ from ccr_gym.observation import FORCE_SCALE_N
 from ccr_gym.tasks import in_test_split
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
-EXACT = {name: (0.0, 0.0) for name in ("noise_n", "bias_n", "backlash_mm", "friction")} | {"stiffness": (1.0, 1.0)}
+EXACT = {name: (0.0, 0.0) for name in ("noise_n", "bias_n", "backlash_mm", "tendon_loss")} | {
+    "rigidity_ratio": (1.0, 1.0)
+}
 
 
 def make(env_id, **kwargs):
@@ -73,16 +75,18 @@ def test_the_truth_of_many_is_that_of_each_and_trying_a_move_tells_its_force(env
     for i, env in enumerate(singles):
         env.reset(seed=4 + i)
     for _ in range(25):
-        truth = envs.truth
+        truth = envs.privileged_state
         for i, env in enumerate(singles):
-            for many, one in zip(truth, env.truth, strict=True):
+            for many, one in zip(truth, env.privileged_state, strict=True):
                 assert np.array_equal(many[i], one)
         actions = generator.uniform(-0.3, 1, envs.action_space.shape).astype(np.float32)
         envs.step(actions)
         for env, action in zip(singles, actions, strict=True):
             env.step(action)
-        assert envs.probe(envs.truth.places) == pytest.approx(envs.truth.force, abs=1e-6)
-        assert singles[0].probe(singles[0].truth.places) == pytest.approx(singles[0].truth.force, abs=1e-6)
+        assert envs.probe(envs.privileged_state.places) == pytest.approx(envs.privileged_state.force, abs=1e-6)
+        assert singles[0].probe(singles[0].privileged_state.places) == pytest.approx(
+            singles[0].privileged_state.force, abs=1e-6
+        )
 
 
 def test_backlash_is_taken_up_before_anything_moves():
@@ -96,7 +100,8 @@ def test_backlash_is_taken_up_before_anything_moves():
 
 def test_forces_grow_with_the_rigidity_and_shapes_do_not_change():
     soft, stiff = (
-        play(make("CCR/PushObstacle-v0", sensing={**EXACT, "latency": [0, 0], "stiffness": [s, s]})) for s in (0.5, 2.0)
+        play(make("CCR/PushObstacle-v0", sensing={**EXACT, "latency": [0, 0], "rigidity_ratio": [s, s]}))
+        for s in (0.5, 2.0)
     )
     touched = False
     for (seen, info), (same, told) in zip(soft, stiff, strict=True):
@@ -135,7 +140,7 @@ def test_training_and_test_scenes_have_none_in_common(env_id):
         ({"sensing": {"latency": [1, 9]}}, "latency is"),
         ({"sensing": {"latency": [0.5, 1.5]}}, "whole numbers"),
         ({"sensing": {"noise_n": [0.2, 0.1]}}, "noise_n is"),
-        ({"sensing": {"stiffness": [0.0, 1.0]}}, "stiffness is"),
+        ({"sensing": {"rigidity_ratio": [0.0, 1.0]}}, "rigidity_ratio is"),
         ({"split": "validation"}, "split is"),
     ],
 )
@@ -145,5 +150,5 @@ def test_what_it_refuses(kwargs, message):
 
 
 def test_the_ranges_are_kept():
-    assert make("CCR/PushObstacle-v0", sensing="realistic").unwrapped.settings.senses == Sensing()
-    assert make("CCR/PushObstacle-v0").unwrapped.settings.senses is None
+    assert make("CCR/PushObstacle-v0", sensing="realistic").unwrapped.settings.sensors == Sensing()
+    assert make("CCR/PushObstacle-v0").unwrapped.settings.sensors is None

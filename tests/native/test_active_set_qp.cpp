@@ -1,5 +1,5 @@
 // Active-set problems built backwards from their answer: the shape is free, the gaps are walls that one point each can
-// touch, so that a wall's normal gives its gradient and its offset any gap that is wanted. A sliding cable is one more
+// touch, so that a wall's normal gives its gradient and its offset any gap that is wanted. The cable of a rod is one more
 // gap, its slack, which the displacement sets.
 #include <algorithm>
 
@@ -117,7 +117,7 @@ struct Wanted {
   std::vector<Obstacle<kSpace>> obstacles;
 };
 
-// Of some of the walls, and of a sliding cable.
+// Of some of the walls, and of the cable of a rod.
 template <class Model>
 std::vector<double> choose(Random& random, int walls, double pushing) {
   std::vector<double> out(static_cast<std::size_t>(walls));

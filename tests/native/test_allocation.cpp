@@ -86,7 +86,7 @@ Pulled<D> twice(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacle
 
 RobotNumbers prototype(bool rod = false) {
   RobotNumbers of;
-  of.rod = sliding;
+  of.rod = rod;
   return of;
 }
 

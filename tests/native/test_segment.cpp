@@ -30,13 +30,13 @@ constexpr double kClose = 1e-8;               // what they leave, relative to sl
 
 bool near(double a, double b, double scale) { return std::abs(a - b) <= kClose * scale; }
 
-PaperLaw::Bend uniform(double sine, double pull, double scale) {
+PaperLaw::Bend paper(double sine, double pull, double scale) {
   PaperLaw::Bends bends(1);
   PaperLaw::bend(1, &sine, pull * scale, 10 * scale, 8 * scale, bends);
   return bends[0];
 }
 
-RodLaw::Bend sliding(double angle, double scale) {
+RodLaw::Bend rod(double angle, double scale) {
   RodLaw::Bends bends(1);
   RodLaw::bend(1, &angle, 0, 10 * scale, 8 * scale, bends);
   return bends[0];
@@ -51,11 +51,11 @@ double cable_length(double forward, double sideways, double cosine, double sine,
 double heading(const PaperLaw::Bend& bend) { return std::atan2(bend.sideways, bend.forward); }
 double chord(const RodLaw::Bend& bend) { return std::hypot(bend.forward, bend.sideways); }
 
-TEST_CASE("a segment of a uniform cable is as long as its cables say") {
+TEST_CASE("a segment of the paper's robot is as long as its cables say") {
   for (const double scale : kScales)
     for (const double pull : {0.0, 0.05, 0.4, 0.78})
       for (const double sine : {-0.6, -0.1, 0.0, 0.3, 0.7}) {
-        const auto bend = uniform(sine, pull, scale);
+        const auto bend = paper(sine, pull, scale);
         CHECK(std::hypot(bend.forward, bend.sideways) == doctest::Approx(1).epsilon(1e-14));
         CHECK(bend.cosine == doctest::Approx(std::cos(bend.angle)).epsilon(1e-14));
         CHECK(bend.sine == doctest::Approx(std::sin(bend.angle)).epsilon(1e-14));
@@ -65,7 +65,7 @@ TEST_CASE("a segment of a uniform cable is as long as its cables say") {
       }
 }
 
-TEST_CASE("the slopes of a uniform cable's segment are those of its shape") {
+TEST_CASE("the slopes of the paper's segment are those of its shape") {
   for (const double scale : kScales)
     for (const double pull : {0.0, 0.05, 0.4, 0.78})
       for (const double sine : {-0.6, -0.1, 0.0, 0.3, 0.7}) {
@@ -73,22 +73,22 @@ TEST_CASE("the slopes of a uniform cable's segment are those of its shape") {
         CAPTURE(pull);
         CAPTURE(sine);
         const double h = kDifference;
-        const auto at = uniform(sine, pull, scale), more = uniform(sine + h, pull, scale), less = uniform(sine - h, pull, scale);
+        const auto at = paper(sine, pull, scale), more = paper(sine + h, pull, scale), less = paper(sine - h, pull, scale);
         CHECK(near(at.slope, (more.angle - less.angle) / (2 * h), 1));
         CHECK(near(at.curvature, (more.slope - less.slope) / (2 * h), 1));
         CHECK(near(at.heading_slope, (heading(more) - heading(less)) / (2 * h), 1));
         CHECK(near(at.heading_curvature, (more.heading_slope - less.heading_slope) / (2 * h), 10));
-        const auto pulled = uniform(sine, pull + h, scale), eased = uniform(sine, pull - h, scale);
+        const auto pulled = paper(sine, pull + h, scale), eased = paper(sine, pull - h, scale);
         CHECK(near(at.displacement_slope * scale, (pulled.angle - eased.angle) / (2 * h), 1));
       }
 }
 
 TEST_CASE("a segment that shears beyond its cable has no shape") { CHECK(std::isnan(uniform(0.99, 0.9, 1).angle)); }
 
-TEST_CASE("a segment of a sliding cable is an arc, and takes what the way between its holes is short of") {
+TEST_CASE("a segment of the rod is an arc, and takes what the way between its holes is short of") {
   for (const double scale : kScales)
     for (const double angle : {-2.5, -0.4, 0.0, 1e-5, 0.1, 1.1}) {  // until the disks meet
-      const auto bend = sliding(angle, scale);
+      const auto bend = rod(angle, scale);
       CHECK(bend.cosine == doctest::Approx(std::cos(angle)).epsilon(1e-13));
       CHECK(bend.sine == doctest::Approx(std::sin(angle)).epsilon(1e-13));
       CHECK(chord(bend) == doctest::Approx(angle == 0 ? 1 : std::sin(angle / 2) / (angle / 2)).epsilon(1e-13));
@@ -98,12 +98,12 @@ TEST_CASE("a segment of a sliding cable is an arc, and takes what the way betwee
     }
 }
 
-TEST_CASE("the slopes of a sliding cable's segment are those of its shape") {
+TEST_CASE("the slopes of a rod's segment are those of its shape") {
   for (const double scale : kScales)
     for (const double angle : {-2.5, -0.4, 0.0, 1e-5, 0.1, 1.0, 3.0}) {
       CAPTURE(angle);
       const double h = kDifference;
-      const auto at = sliding(angle, scale), more = sliding(angle + h, scale), less = sliding(angle - h, scale);
+      const auto at = rod(angle, scale), more = rod(angle + h, scale), less = rod(angle - h, scale);
       CHECK(near(at.stretch * chord(at), (chord(more) - chord(less)) / (2 * h), 1));
       CHECK(near(at.stretch_slope * chord(at), (more.stretch * chord(more) - less.stretch * chord(less)) / (2 * h), 1));
       CHECK(near(at.taken_slope, (more.taken - less.taken) / (2 * h), 10 * scale));

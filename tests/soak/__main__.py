@@ -15,7 +15,7 @@ from soak.episodes import Episode, play
 from soak.report import Tally, table
 from soak.scenes import MODELS
 
-SHARES = {"uniform": 0.4, "sliding": 0.4, "space": 0.2}
+SHARES = {"paper": 0.4, "rod": 0.4, "space": 0.2}
 STEPS = 500  # of an episode
 REPORTS = 20  # on the way
 KEPT = 10  # cases of a kind that are made small and kept

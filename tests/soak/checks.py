@@ -150,7 +150,7 @@ def _reason(solver, taken, k):
     near_zero = PRETENSION * robot.offset_mm
     pulled = command_of(state)[:-1]
     if isinstance(robot, Robot):
-        if robot.cable == "uniform" and pulled[0] < near_zero:
+        if robot.model == "paper" and pulled[0] < near_zero:
             return "slack"
     elif np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"

@@ -50,8 +50,8 @@ def scale_scene(scene, s):
 
 def scale_obstacle(obstacle, s):
     """One obstacle s times as large and as far."""
-    matrix = obstacle.stiffness and tuple(times(row, 1 / s) for row in obstacle.stiffness)
-    scaled = replace(obstacle, stiffness=matrix, **_lengths(obstacle, s))
+    matrix = obstacle.spring and tuple(times(row, 1 / s) for row in obstacle.spring)
+    scaled = replace(obstacle, spring=matrix, **_lengths(obstacle, s))
     for direction in DIRECTIONS:  # normalised once more on construction, which may change their last bits
         if hasattr(obstacle, direction):
             object.__setattr__(scaled, direction, getattr(obstacle, direction))

@@ -13,10 +13,10 @@ from soak.cores import line_points
 from soak.scale import scale_robot, scale_scene
 from soak.shapes import distance
 from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver, spatial
-from solver.robot import LINES
+from solver.planar.robot import LINES
 from solver.spatial import SpatialRobot, SpatialSolver
 
-MODELS = ("uniform", "sliding", "space")
+MODELS = ("paper", "rod", "space")
 SCALES = (0.1, 1.0, 1.0, 1.0, 10.0)
 TRIES = 200
 OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
@@ -58,9 +58,9 @@ def make_solver(robot, scene):
     return (Solver if isinstance(robot, Robot) else SpatialSolver)(robot, scene)
 
 
-def planar_robot(generator, cable):
+def planar_robot(generator, model):
     """The prototype, or one of more or fewer segments, other lines and points, and a base that inserts it."""
-    robot = replace(Robot.prototype(segments=int(generator.choice([9, 18, 18, 18, 30]))), cable=cable)
+    robot = replace(Robot.prototype(segments=int(generator.choice([9, 18, 18, 18, 30]))), model=model)
     if generator.random() < 0.5:
         robot = replace(robot, between=int(generator.integers(4)))
     if generator.random() < 0.3:
@@ -130,7 +130,7 @@ def _width(robot):
 def _planar_shape(generator, robot, thinnest, spring):
     center, axis = _ahead(generator), _unit(generator, 2)
     across, along = thinnest + generator.exponential(3, 2)
-    place = {"center": tuple(center), "stiffness": spring}
+    place = {"center": tuple(center), "spring": spring}
     match generator.integers(6):
         case 0:
             return Circle(radius=across, **place)
@@ -138,7 +138,7 @@ def _planar_shape(generator, robot, thinnest, spring):
             return Ellipse(radii=(across, along), axis=tuple(axis), **place)
         case 2:
             ends = {"start": tuple(center - along * axis), "end": tuple(center + along * axis)}
-            return Capsule(radius=across, stiffness=spring, **ends)
+            return Capsule(radius=across, spring=spring, **ends)
         case 3:
             return _polygon(generator, center, along + 2, across / 2, spring)
         case 4:
@@ -146,14 +146,14 @@ def _planar_shape(generator, robot, thinnest, spring):
                 family=OVAL, sizes=(across + 1, along + 1), axis=tuple(axis), reach=2.5 * (across + along), **place
             )
         case _:
-            return HalfPlane(point=tuple(center), normal=(-1, generator.uniform(-1, 1)), stiffness=spring)
+            return HalfPlane(point=tuple(center), normal=(-1, generator.uniform(-1, 1)), spring=spring)
 
 
 def _polygon(generator, center, size, radius, spring=None):
     count = int(generator.integers(3, 9))
     angles = 2 * np.pi / count * (np.arange(count) + generator.uniform(0, 0.4, count)) + generator.uniform(0, 6)
     ring = center + size * np.column_stack([np.cos(angles), np.sin(angles)])
-    return Polygon(corners=tuple(map(tuple, ring)), radius=radius, stiffness=spring)
+    return Polygon(corners=tuple(map(tuple, ring)), radius=radius, spring=spring)
 
 
 def circles(generator, robot):
@@ -258,10 +258,10 @@ def _spatial_shape(generator, robot, thinnest, spring, edge=None, low=20.0):
     center, axis, second = _around(generator, low), _unit(generator, 3), _unit(generator, 3)
     across, along = thinnest + generator.exponential(4, 2)
     edge = generator.uniform(0.2, 1) * thinnest if edge is None else edge
-    ends = {"start": tuple(center - along * axis), "end": tuple(center + along * axis), "stiffness": spring}
+    ends = {"start": tuple(center - along * axis), "end": tuple(center + along * axis), "spring": spring}
     match generator.integers(5):
         case 0:
-            return spatial.Sphere(center=tuple(center), radius=across, stiffness=spring)
+            return spatial.Sphere(center=tuple(center), radius=across, spring=spring)
         case 1:
             return spatial.Capsule(radius=across, **ends)
         case 2:
@@ -269,10 +269,10 @@ def _spatial_shape(generator, robot, thinnest, spring, edge=None, low=20.0):
         case 3:
             sizes = 2 * thinnest + generator.exponential(8, 3)
             box = {"axis": tuple(axis), "second": tuple(second), "edge": min(edge, sizes.min() / 2)}
-            return spatial.Box(center=tuple(center), sizes=tuple(sizes), stiffness=spring, **box)
+            return spatial.Box(center=tuple(center), sizes=tuple(sizes), spring=spring, **box)
         case _:
             inward = np.array([-center[0], -center[1], 0]) / math.hypot(*center[:2])
-            return spatial.HalfSpace(point=tuple(center), normal=tuple(inward + 0.3 * axis), stiffness=spring)
+            return spatial.HalfSpace(point=tuple(center), normal=tuple(inward + 0.3 * axis), spring=spring)
 
 
 def spheres(generator, robot):

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Obstacle, Polygon, Robot, Scene, free
+from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Obstacle, Polygon, Robot, Scene
+from solver.planar import free
 
 
 def make_circles(*circles: tuple[float, float, float]) -> Scene:
@@ -49,7 +50,7 @@ def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
 
 
 def _still_disc(obstacle: Obstacle) -> bool:
-    return bool(np.isfinite(obstacle.extent.radius)) and obstacle.stiffness is None
+    return bool(np.isfinite(obstacle.extent.radius)) and obstacle.spring is None
 
 
 def clearance(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
@@ -95,7 +96,7 @@ def random_shapes(generator: np.random.Generator, robot: Robot) -> Scene:
     """One to four obstacles of any kind, fixed or on springs, with a core, that leave the unactuated robot free."""
     while True:
         shapes = [random_shape(generator) for _ in range(generator.integers(1, 5))]
-        scene = Scene(replace(shape, stiffness=random_spring(generator)) for shape in shapes)
+        scene = Scene(replace(shape, spring=random_spring(generator)) for shape in shapes)
         cored = all(2 * shape.extent.inradius > max(robot.edges_mm) for shape in shapes)
         if cored and free.clearance(robot, scene, 0.0) > 1:
             return scene

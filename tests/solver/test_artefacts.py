@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from solver import artefacts
-from solver.artefacts import ArtefactStore, artefact_key
+from solver.cache import artefacts
+from solver.cache.artefacts import ArtefactStore, artefact_key
 
 KEY = artefact_key("formulation", "casadi", "cc")
 
@@ -79,7 +79,7 @@ def test_where_nothing_can_be_written_a_temporary_folder_serves(tmp_path):
 PROCESS = """
 import sys, time
 from pathlib import Path
-from solver.artefacts import ArtefactStore
+from solver.cache.artefacts import ArtefactStore
 def build(path):
     path.write_text("law")
     time.sleep(0.3)

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 
 from solver import Circle, Robot, Scene, Solver, Status
-from solver.batch import BatchSolver
-from solver.robot import CABLES
+from solver.planar.batch import BatchSolver
+from solver.planar.robot import MODELS
 
-EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
 def circles(generator, count):
     drawn = generator.uniform((38, 75, 10), (75, 150, 16), (count, 3)).tolist()
-    return [Circle(center=(x, y), radius=r, stiffness=0.5 if k % 3 == 0 else None) for k, (x, y, r) in enumerate(drawn)]
+    return [Circle(center=(x, y), radius=r, spring=0.5 if k % 3 == 0 else None) for k, (x, y, r) in enumerate(drawn)]
 
 
-@EVERY_CABLE
+@EVERY_MODEL
 @pytest.mark.parametrize("threads", [1, 2, 3])
-def test_every_robot_moves_as_alone(cable, threads):
-    robot, generator = replace(Robot.prototype(), cable=cable), np.random.default_rng(4)
+def test_every_robot_moves_as_alone(model, threads):
+    robot, generator = replace(Robot.prototype(), model=model), np.random.default_rng(4)
     scenes = [Scene([circle]) for circle in circles(generator, 37)]
     batch = BatchSolver(robot, len(scenes), 1, threads)
     for i, scene in enumerate(scenes):
@@ -59,7 +59,7 @@ def test_reaches_is_a_steady_pull():
     batch, forces = BatchSolver(Robot.prototype(), 60, 1), generator.uniform(0.02, 0.3, 60)
     for i, scene in enumerate(scenes):
         batch.assign(i, scene)
-    found, ends = batch.reaches(range(60), forces, 0.5, 14.0)
+    found, ends = batch.ramp_reaches_force(range(60), forces, 0.5, 14.0)
     for scene, force, reached, end in zip(scenes, forces, found, ends, strict=True):
         solver = Solver(Robot.prototype(), scene)
         now, expected = solver.rest(), False
@@ -79,7 +79,7 @@ FORKED = """
 import os
 import numpy as np
 from solver import Robot, Scene
-from solver.batch import BatchSolver
+from solver.planar.batch import BatchSolver
 batch = BatchSolver(Robot.prototype(), 64, 0, threads=2)
 for i in range(64):
     batch.assign(i, Scene())
@@ -141,9 +141,9 @@ def crowd(count, segments, threads=1):
     return batch
 
 
-@EVERY_CABLE
-def test_optimality(cable):
-    robot, generator = replace(Robot.prototype(), cable=cable), np.random.default_rng(6)
+@EVERY_MODEL
+def test_optimality(model):
+    robot, generator = replace(Robot.prototype(), model=model), np.random.default_rng(6)
     scenes = [Scene([circle]) for circle in circles(generator, 9)]
     batch, solvers = BatchSolver(robot, 9, 1), [Solver(robot, scene) for scene in scenes]
     for i, scene in enumerate(scenes):
@@ -161,10 +161,10 @@ def test_optimality(cable):
     assert sum(batch.equilibrium(i).contact.any() for i in range(9)) >= 3
 
 
-@EVERY_CABLE
-def test_optimality_of_what_is_no_equilibrium(cable):
+@EVERY_MODEL
+def test_optimality_of_what_is_no_equilibrium(model):
     """A robot whose segments are bent a little otherwise, or whose contact pushes harder, than it should."""
-    robot, scene = replace(Robot.prototype(), cable=cable), Scene([Circle(center=(44, 104), radius=15)])
+    robot, scene = replace(Robot.prototype(), model=model), Scene([Circle(center=(44, 104), radius=15)])
     batch, solver = BatchSolver(robot, 3, 1), Solver(robot, scene)
     for i in range(3):
         batch.assign(i, scene)
@@ -197,7 +197,7 @@ def test_a_batch_in_use_by_another_thread_says_so_and_nothing_of_it_changes():
         lambda: batch.probe(batch.commands),
         lambda: batch.equilibrium(299),
         batch.optimality,
-        lambda: batch.reaches([299], np.array([0.1]), 0.5, 9.0),
+        lambda: batch.ramp_reaches_force([299], np.array([0.1]), 0.5, 9.0),
     ]
     for use in uses:
         with pytest.raises(RuntimeError, match="in use by another thread; give each thread a batch of its own"):
@@ -215,7 +215,7 @@ INTERRUPTED = """
 import signal, threading, time
 import numpy as np
 from solver import Circle, Robot, Scene
-from solver.batch import BatchSolver
+from solver.planar.batch import BatchSolver
 
 robot, scene = Robot(length_mm=180, segments=200, offset_mm=8), Scene([Circle(center=(44, 104), radius=15)])
 count = 4000

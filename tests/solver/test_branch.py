@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
-from solver.robot import LINES
+from solver.planar.robot import LINES
 
 BLOCKING = ((32.4, 84.7, 14.9), (57.6, 148.6, 14.3))
 SLIPPERY = [
@@ -115,7 +115,7 @@ def test_touching_robot_keeps_its_pretension():
 
 def test_trace_begins_and_ends_with_the_equilibria_of_the_step():
     robot = replace(Robot.prototype(), touch=LINES, between=1)
-    solver = Solver(robot, Scene([Circle(center=(33, 89), radius=12.5, stiffness=0.5)]))
+    solver = Solver(robot, Scene([Circle(center=(33, 89), radius=12.5, spring=0.5)]))
     before = walk(solver, solver.rest(), [3.0, 6.0])
     after, trace = solver.step(before, 9.0), solver.trace(before, 9.0)
     assert after.displacements.any()
@@ -205,7 +205,7 @@ def test_motor_yields_where_a_release_snaps_to_more_tension_than_it_holds(pulls)
 @pytest.mark.parametrize(("x", "release"), [(67.05, 0.03), (67.1, 0.1), (67.4, 0.31)])
 def test_a_tip_that_rolls_onto_a_circle_is_not_taken_for_blocked(x, release):
     """Two gaps close at the end of the descent, which costs more energy than is left to win."""
-    robot = replace(Robot.prototype(), cable="sliding")
+    robot = replace(Robot.prototype(), model="rod")
     solver = Solver(robot, Scene([Circle(center=(x, 132.6), radius=13.7)]))
     state = walk(solver, solver.rest(), np.arange(0.5, 12, 0.5).tolist())
     statuses = set()
@@ -218,9 +218,9 @@ def test_a_tip_that_rolls_onto_a_circle_is_not_taken_for_blocked(x, release):
 
 
 SMALL_SNAPS = [  # cable, circles, where the step of 0.5 mm begins and ends [mm]
-    ("sliding", ((61.960395, 140.412247, 11.092004), (45.735903, 82.051608, 10.097247)), 10.5, 10.0),
+    ("rod", ((61.960395, 140.412247, 11.092004), (45.735903, 82.051608, 10.097247)), 10.5, 10.0),
     (
-        "uniform",
+        "paper",
         ((56.417880, 127.799052, 15.862201), (72.076162, 144.512886, 12.462216), (56.428765, 80.038946, 10.286344)),
         11.0,
         11.5,
@@ -228,10 +228,10 @@ SMALL_SNAPS = [  # cable, circles, where the step of 0.5 mm begins and ends [mm]
 ]
 
 
-@pytest.mark.parametrize(("cable", "obstacles", "start", "end"), SMALL_SNAPS, ids=["released", "pulled"])
-def test_a_small_snap_within_a_step_is_told(cable, obstacles, start, end, circles, pulls):
+@pytest.mark.parametrize(("model", "obstacles", "start", "end"), SMALL_SNAPS, ids=["released", "pulled"])
+def test_a_small_snap_within_a_step_is_told(model, obstacles, start, end, circles, pulls):
     """Of 1.4 and 2.4 mm, no more than the robot moves along its branch in the same step."""
-    solver = Solver(replace(Robot.prototype(), cable=cable), circles(*obstacles))
+    solver = Solver(replace(Robot.prototype(), model=model), circles(*obstacles))
     before = walk(solver, solver.rest(), pulls(start, 0.5))
     fine, statuses = before, set()
     for part in np.linspace(start, end, 101)[1:]:
@@ -244,11 +244,11 @@ def test_a_small_snap_within_a_step_is_told(cable, obstacles, start, end, circle
     assert coarse.nodes == pytest.approx(fine.nodes, abs=1e-8)
 
 
-@pytest.mark.parametrize("cable", ["uniform", "sliding"])
-def test_a_large_step_ends_where_small_ones_do(cable, random_scene):
+@pytest.mark.parametrize("model", ["paper", "rod"])
+def test_a_large_step_ends_where_small_ones_do(model, random_scene):
     generator = np.random.default_rng(11)
     for _ in range(12):
-        solver = Solver(replace(Robot.prototype(), cable=cable), random_scene(generator))
+        solver = Solver(replace(Robot.prototype(), model=model), random_scene(generator))
         equilibrium = solver.rest()
         for change in generator.choice([-0.5, 0.5], 24, p=[0.3, 0.7]):
             cable_mm = float(np.clip(equilibrium.cable_mm + change, 0, 14))

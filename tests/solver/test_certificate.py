@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
-from solver.formulation import GAP_LAWS
-from solver.robot import CABLES, LINES
+from solver.planar.formulation import GAP_LAWS
+from solver.planar.robot import LINES, MODELS
 
 obstacles = st.builds(
-    lambda x, y, radius, stiffness: Circle(center=(x, y), radius=radius, stiffness=stiffness),
+    lambda x, y, radius, spring: Circle(center=(x, y), radius=radius, spring=spring),
     st.floats(35, 75),
     st.floats(75, 150),
     st.floats(10, 16),
@@ -21,7 +21,7 @@ obstacles = st.builds(
 )
 scenes = st.lists(obstacles, min_size=1, max_size=3).map(Scene)
 increments = st.lists(st.tuples(st.floats(-0.2, 0.5), st.floats(-1, 1)), min_size=10, max_size=60)
-EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 SHORTEST, LONGEST = 120.0, 180.0
 
 
@@ -34,20 +34,20 @@ def follow(solver, changes):
         yield equilibrium
 
 
-@EVERY_CABLE
+@EVERY_MODEL
 @settings(max_examples=40)
 @given(scene=scenes, start=st.floats(1, 8), changes=increments)
-def test_residuals(cable, scene, start, changes):
-    robot = replace(Robot.prototype(), cable=cable, length_range_mm=(SHORTEST, LONGEST))
+def test_residuals(model, scene, start, changes):
+    robot = replace(Robot.prototype(), model=model, length_range_mm=(SHORTEST, LONGEST))
     certify(follow(Solver(robot, scene), [(start, 0.0), *changes]))
 
 
-@EVERY_CABLE
+@EVERY_MODEL
 @pytest.mark.parametrize(
     ("touch", "scenes"), [({}, 60), ({"touch": LINES, "between": 3}, 20)], ids=["paper", "everywhere"]
 )
-def test_residuals_of_every_shape(random_shapes, cable, touch, scenes):
-    robot, generator = replace(Robot.prototype(), cable=cable, **touch), np.random.default_rng(3)
+def test_residuals_of_every_shape(random_shapes, model, touch, scenes):
+    robot, generator = replace(Robot.prototype(), model=model, **touch), np.random.default_rng(3)
     touched, springs = set(), 0
     for _ in range(scenes):
         scene = random_shapes(generator, robot)
@@ -72,11 +72,11 @@ def certify(equilibria):
         assert residuals.complementarity <= 1e-10
 
 
-@EVERY_CABLE
+@EVERY_MODEL
 @settings(max_examples=8)
 @given(scene=scenes, changes=st.lists(st.tuples(st.floats(0.1, 0.5), st.floats(-1, 1)), min_size=24, max_size=40))
-def test_reference_solver(cable, scene, changes):
-    robot = replace(Robot.prototype(max_tension=math.inf), cable=cable, length_range_mm=(SHORTEST, LONGEST))
+def test_reference_solver(model, scene, changes):
+    robot = replace(Robot.prototype(max_tension=math.inf), model=model, length_range_mm=(SHORTEST, LONGEST))
     solver, reference = Solver(robot, scene), ReferenceSolver(robot, scene)
     before = solver.step(solver.rest(), 1.0, 175.0)
     asked, answered = 0, 0

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from solver import Custom, Ellipse, Family, ReferenceSolver, Robot, Scene, Solver, Status
-from solver.compile import store
-from solver.robot import CABLES
+from solver.cache.compile import store
+from solver.planar.robot import MODELS
 
 ELLIPSE = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
 EGG = Family.trace(lambda point, sizes: (point[0] ** 2 + point[1] ** 2 + sizes[0] * point[0]) ** 2 - sizes[1] ** 4, 2)
 PLACE = {"center": (44, 104), "axis": (1, 2)}
-EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
 def egg(**changes):
@@ -39,16 +39,16 @@ def test_a_custom_ellipse_is_the_ellipse():
     assert custom.gap(points) == pytest.approx(ellipse.gap(points), abs=1e-12)
     assert custom.normal_at(points) == pytest.approx(ellipse.normal_at(points), abs=1e-12)
     assert custom.extent.inradius == pytest.approx(ellipse.extent.inradius, rel=5e-3)
-    assert custom.extent.fineness == pytest.approx(ellipse.extent.fineness, rel=1e-2)
+    assert custom.extent.min_curvature_radius == pytest.approx(ellipse.extent.min_curvature_radius, rel=1e-2)
     for ours, theirs in zip(pulled(Robot.prototype(), custom), pulled(Robot.prototype(), ellipse), strict=True):
         assert ours.nodes == pytest.approx(theirs.nodes, abs=1e-9)
         assert ours.multipliers == pytest.approx(theirs.multipliers, abs=1e-12)
 
 
-@EVERY_CABLE
-@pytest.mark.parametrize("stiffness", [None, 0.5])
-def test_certificate(cable, stiffness):
-    states = list(pulled(replace(Robot.prototype(), cable=cable), egg(stiffness=stiffness)))
+@EVERY_MODEL
+@pytest.mark.parametrize("spring", [None, 0.5])
+def test_certificate(model, spring):
+    states = list(pulled(replace(Robot.prototype(), model=model), egg(spring=spring)))
     assert states[-1].contact.any()
     for state in states:
         assert state.status is Status.CONVERGED

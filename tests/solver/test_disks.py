@@ -7,10 +7,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
-from solver.forces import force_true
-from solver.formulation import disk_gap_function, limits, node_problem
-from solver.sensitivity import CABLE, sensitivity
+from solver import Circle, ReferenceSolver, Robot, Scene, Sensitivity, Solver, Status, sensitivity
+from solver.planar.forces import force_true
+from solver.planar.formulation import disk_gap_function, limits, node_problem
 
 CIRCLE = Circle(center=(42, 143), radius=28)
 SIZES = pytest.mark.parametrize(("length", "radius", "thickness"), [(10, 8, 0), (15, 60, 0), (15, 40, 2), (10, 25, 3)])
@@ -25,7 +24,7 @@ def make_robot(radius, thickness):
         length_mm=180,
         segments=12,
         offset_mm=8,
-        cable="sliding",
+        model="rod",
         max_tension=1000,
         between=2,
         disk_radius_mm=radius,
@@ -147,9 +146,13 @@ def test_sensitivities_hold_the_disks_that_meet(radius, thickness, before, after
     assert (here.disk_multipliers < 0).any()
     assert np.array_equal(np.sign(ahead.disk_multipliers), np.sign(behind.disk_multipliers))
     slopes = sensitivity(here)
-    assert slopes.nodes[CABLE] == pytest.approx((ahead.nodes - behind.nodes) / (2 * step), rel=1e-5, abs=1e-5)
-    assert slopes.tension[CABLE] == pytest.approx((ahead.tension - behind.tension) / (2 * step), rel=1e-5)
-    assert slopes.forces[CABLE] == pytest.approx((force_true(ahead) - force_true(behind)) / (2 * step), rel=1e-5)
+    assert slopes.nodes[Sensitivity.CABLE] == pytest.approx(
+        (ahead.nodes - behind.nodes) / (2 * step), rel=1e-5, abs=1e-5
+    )
+    assert slopes.tension[Sensitivity.CABLE] == pytest.approx((ahead.tension - behind.tension) / (2 * step), rel=1e-5)
+    assert slopes.forces[Sensitivity.CABLE] == pytest.approx(
+        (force_true(ahead) - force_true(behind)) / (2 * step), rel=1e-5
+    )
 
 
 def test_a_cable_that_shears_its_segments_has_no_disks_that_meet():
@@ -161,4 +164,4 @@ def test_a_cable_that_shears_its_segments_has_no_disks_that_meet():
 @pytest.mark.parametrize(("field", "value"), [("disk_radius_mm", 0.0), ("disk_thickness_mm", 9.5)])
 def test_disks_that_cannot_be(field, value):
     with pytest.raises(ValueError, match=rf"{field} is {value}; it must be from"):
-        Robot(length_mm=180, segments=18, offset_mm=8, cable="sliding", **{field: value})
+        Robot(length_mm=180, segments=18, offset_mm=8, model="rod", **{field: value})

@@ -147,7 +147,7 @@ def test_a_snake_arm_slips_off_its_circle_whatever_its_size(s, increment):
 @pytest.mark.parametrize("increment", [0.02, 0.1, 0.5, 1.5, 9.5])
 def test_a_motor_stalls_before_the_peak_of_the_tension_and_not_behind_it(increment):
     """Between 9.0 and 9.5 mm the tension rises to 7.790 N and falls again to 7.715 N."""
-    robot = replace(Robot.prototype(), cable="sliding", max_tension=7.78, between=1)
+    robot = replace(Robot.prototype(), model="rod", max_tension=7.78, between=1)
     braced = Circle(center=(38.489, 73.892), radius=8.132), Circle(center=(65.664, 156.712), radius=12.853)
     solver = Solver(robot, Scene(braced))
     commands = np.minimum(np.arange(1, np.ceil(9.5 / increment) + 1) * increment, 9.5)
@@ -162,7 +162,7 @@ def test_a_motor_stalls_before_the_peak_of_the_tension_and_not_behind_it(increme
 
 
 def test_disks_of_a_strongly_bent_robot_meet_and_the_certificate_holds():
-    robot = Robot(length_mm=180, segments=18, offset_mm=25, cable="sliding")
+    robot = Robot(length_mm=180, segments=18, offset_mm=25, model="rod")
     solver = Solver(robot, Scene([Circle(center=(70, 71), radius=14), Circle(center=(60, 117), radius=11)]))
     states = walk(solver, np.arange(1, 69))
     assert states[60].cable_mm == pytest.approx(60)

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from solver import HalfPlane, Robot, Scene, Solver, Status
-from solver.forces import force_true
+from solver.planar.forces import force_true
 
 LENGTH, OFFSET, RIGIDITY = 180.0, 8.0, 5000.0
 COMMON = np.linspace(0, LENGTH, 10)  # where every refinement has a node
@@ -71,7 +71,7 @@ def pulled(segments, cable_mm, *walls_mm):
         offset_mm=OFFSET,
         rigidity=RIGIDITY,
         max_tension=math.inf,
-        cable="sliding",
+        model="rod",
         touch=("backbone",),
     )
     every = segments // 9

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from solver import Capsule, Circle, Ellipse, Equilibrium, HalfPlane, Polygon, Robot, Scene, Solver
-from solver.forces import VirtualWork, force_true, onset_tension
-from solver.formulation import limits, node_derivatives
-from solver.free import fitted_slopes, tip_slopes
-from solver.layout import TENSION, layout
-from solver.robot import CABLES
+from solver.common.layout import TENSION
+from solver.planar.forces import VirtualWork, force_true, onset_tension
+from solver.planar.formulation import limits, node_derivatives
+from solver.planar.free import fitted_slopes, tip_slopes
+from solver.planar.layout import layout
+from solver.planar.robot import MODELS
 
 SCENES = [
     Scene([Circle(center=(44, 104), radius=15)]),
@@ -19,19 +20,19 @@ SCENES = [
     Scene([HalfPlane(point=(31, 127), normal=(-1, 0), nodes=(14,))]),
     Scene(
         [
-            Circle(center=(33, 89), radius=12.5, stiffness=0.3),
-            Ellipse(center=(59, 140), radii=(16, 12), stiffness=((2, 0.5), (0.5, 1))),
+            Circle(center=(33, 89), radius=12.5, spring=0.3),
+            Ellipse(center=(59, 140), radii=(16, 12), spring=((2, 0.5), (0.5, 1))),
             Capsule(start=(70, 60), end=(80, 70), radius=10.5),
             Polygon(corners=((70, 100), (80, 100), (75, 110)), radius=8),
         ]
     ),
 ]
 EVERY_SCENE = pytest.mark.parametrize("scene", SCENES)
-EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
-def pulled(scene: Scene, cable_mm: float, step: float = 0.25, cable: str = "uniform"):
-    solver = Solver(replace(Robot.prototype(max_tension=math.inf), cable=cable), scene)
+def pulled(scene: Scene, cable_mm: float, step: float = 0.25, model: str = "paper"):
+    solver = Solver(replace(Robot.prototype(max_tension=math.inf), model=model), scene)
     now = solver.rest()
     while now.cable_mm < cable_mm - 1e-9:
         now = solver.step(now, min(now.cable_mm + step, cable_mm))
@@ -42,15 +43,15 @@ def pulled(scene: Scene, cable_mm: float, step: float = 0.25, cable: str = "unif
 def test_force_is_stiffness_times_multiplier(scene):
     _, equilibrium = pulled(scene, 9.0)
     for force, multipliers in zip(force_true(equilibrium), equilibrium.multipliers, strict=True):
-        assert np.linalg.norm(force) <= equilibrium.stiffness * multipliers.sum() * (1 + 1e-12)
+        assert np.linalg.norm(force) <= equilibrium.energy_scale * multipliers.sum() * (1 + 1e-12)
     assert np.linalg.norm(force_true(equilibrium).sum(axis=0)) > 0
 
 
-@EVERY_CABLE
+@EVERY_MODEL
 @EVERY_SCENE
-def test_work_of_tension_and_contact_is_the_change_of_energy(cable, scene):
+def test_work_of_tension_and_contact_is_the_change_of_energy(model, scene):
     """B(∂J/∂q·q' + ∂J/∂l) = T + Σ F_j·x_j' for any admissible direction (q', 1), in node coordinates."""
-    _, equilibrium = pulled(scene, 9.0, cable=cable)
+    _, equilibrium = pulled(scene, 9.0, model=model)
     robot, n = equilibrium.robot, equilibrium.robot.segments
     unknowns, parameters, _, _ = equilibrium.node_solution()
     slope, _, held, _, gaps = (
@@ -58,7 +59,7 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(cable, scene):
     )
     # Admissible: backbone and disks keep their lengths; the cable shortens, by 1/n in each segment or as a whole.
     shortening = np.zeros(3 * n)
-    if cable == "sliding":
+    if model == "rod":
         held, gaps, shortening = np.vstack([held, gaps[:1]]), gaps[limits(robot) :], np.r_[shortening, 1.0]
     else:
         shortening[n : 2 * n] = -1.0 / n
@@ -66,25 +67,25 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(cable, scene):
     generator = np.random.default_rng(0)
     for _ in range(10):
         direction = np.linalg.lstsq(held, shortening, rcond=None)[0] + generator.normal(size=len(null)) @ null
-        work = equilibrium.stiffness * float(equilibrium.multipliers[:, :, 1:].ravel() @ (gaps @ direction))
-        change = equilibrium.stiffness * float(slope.ravel() @ direction)
+        work = equilibrium.energy_scale * float(equilibrium.multipliers[:, :, 1:].ravel() @ (gaps @ direction))
+        change = equilibrium.energy_scale * float(slope.ravel() @ direction)
         assert change == pytest.approx(equilibrium.tension + work, abs=1e-8)
 
 
-@EVERY_CABLE
+@EVERY_MODEL
 @EVERY_SCENE
-def test_tension_is_the_slope_of_the_energy_along_the_branch(cable, scene):
-    solver, equilibrium = pulled(scene, 9.1, cable=cable)
+def test_tension_is_the_slope_of_the_energy_along_the_branch(model, scene):
+    solver, equilibrium = pulled(scene, 9.1, model=model)
     ahead, behind = (solver.step(equilibrium, equilibrium.cable_mm + h) for h in (1e-4, -1e-4))
     slope = (ahead.energy - behind.energy) / 2e-4
     assert slope == pytest.approx(equilibrium.tension, rel=1e-6)
 
 
-@EVERY_CABLE
+@EVERY_MODEL
 @EVERY_SCENE
-def test_kernel_reads_forces_slopes_and_onset(cable, scene):
+def test_kernel_reads_forces_slopes_and_onset(model, scene):
     """As they follow from the multipliers, the closed form of the free robot, and the way there."""
-    robot = replace(Robot.prototype(), cable=cable, length_range_mm=(150, 200))
+    robot = replace(Robot.prototype(), model=model, length_range_mm=(150, 200))
     solver = Solver(robot, scene)
     now = solver.rest()
     for pulled_to, length in [(2.0, 180), (4.0, 181), (6.0, 182), (9.0, 180), (5.0, 179), (1.0, 180)]:
@@ -92,7 +93,7 @@ def test_kernel_reads_forces_slopes_and_onset(cable, scene):
         forces = np.zeros((len(scene), 2))
         for j, line, position in np.argwhere(now.contact):
             normal = scene.obstacles[j].normal_at(now.points[line, position] - now.displacements[j])
-            forces[j] += now.stiffness * now.multipliers[j, line, position] * normal
+            forces[j] += now.energy_scale * now.multipliers[j, line, position] * normal
         assert now.forces == pytest.approx(forces, abs=1e-12)
         places = layout(robot, len(scene))
         assert places.force(now.block) == pytest.approx(forces.sum(axis=0), abs=1e-12)
@@ -131,8 +132,8 @@ def test_estimate_on_a_wall_is_equation_11():
 def test_estimate_knows_nothing_of_the_material(scene):
     _, equilibrium = pulled(scene, 8.0)
     stiffer = replace(equilibrium.robot, rigidity=3 * equilibrium.robot.rigidity)
-    springs = (None if o.stiffness is None else 3 * o.stiffness_matrix for o in scene)
-    scaled = Scene(replace(o, stiffness=k) for o, k in zip(scene, springs, strict=True))
+    springs = (None if o.spring is None else 3 * o.spring_matrix for o in scene)
+    scaled = Scene(replace(o, spring=k) for o, k in zip(scene, springs, strict=True))
     block = equilibrium.block.copy()
     places = layout(stiffer, len(scene))
     for scaling in (lambda block: block[TENSION : TENSION + 1], places.onset, places.forces, places.force):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Solver
-from solver.formulation import (
+from solver.common.gap_laws import gap_function
+from solver.planar.formulation import (
     GAP_LAWS,
     arc_function,
-    gap_function,
     node_problem,
     segment_closure,
     segment_function,
@@ -109,9 +109,9 @@ def test_gap_on_the_outline(obstacle):
     assert obstacle.gap(outline) == pytest.approx(0, abs=1e-12)
     assert np.linalg.norm(slopes, axis=-1) == pytest.approx(1, abs=1e-12)
     assert obstacle.gap(outline + 0.1 * slopes) == pytest.approx(0.1, abs=0.005)
-    center, radius, inradius, fineness = obstacle.extent
+    center, radius, inradius, min_curvature_radius = obstacle.extent
     assert np.linalg.norm(outline - center, axis=-1).max() <= radius * (1 + 1e-12)
-    assert 0 < fineness <= radius
+    assert 0 < min_curvature_radius <= radius
     if len(outline) > 1:
         steps = np.linspace(-radius, radius, 101)
         inside = (center + np.stack(np.meshgrid(steps, steps), axis=-1)).reshape(-1, 2)

@@ -7,38 +7,38 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver
-from solver.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes
-from solver.robot import CABLES
+from solver.planar.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes
+from solver.planar.robot import MODELS
 
-EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
-
-
-def robot_with(cable):
-    return replace(Robot.prototype(), cable=cable, length_range_mm=(100, 200))
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
-@EVERY_CABLE
+def robot_with(model):
+    return replace(Robot.prototype(), model=model, length_range_mm=(100, 200))
+
+
+@EVERY_MODEL
 @pytest.mark.parametrize("length", [180.0, 130.0])
-def test_free_robot_in_closed_form(cable, length):
-    solver = Solver(robot_with(cable), Scene())
+def test_free_robot_in_closed_form(model, length):
+    solver = Solver(robot_with(model), Scene())
     for pulled in (0.0, 0.5, 5.0, 12.0):
         robot, equilibrium = solver.robot.at(length), solver.step(solver.rest(), pulled, length)
         assert free_nodes(robot, pulled) == pytest.approx(equilibrium.nodes, abs=1e-11)
         assert free_tension(robot, pulled) == pytest.approx(equilibrium.tension, abs=1e-11)
 
 
-@EVERY_CABLE
-def test_slopes_of_the_tip(cable):
-    robot, h = robot_with(cable), 1e-5
+@EVERY_MODEL
+def test_slopes_of_the_tip(model):
+    robot, h = robot_with(model), 1e-5
     slopes = (free_nodes(robot, 5 + h)[-1] - free_nodes(robot, 5 - h)[-1]) / (2 * h)
     assert tip_slopes(robot, 5.0) == pytest.approx(slopes, rel=1e-7)
     slopes = (free_nodes(robot, 5 + h)[14] - free_nodes(robot, 5 - h)[14]) / (2 * h)
     assert tip_slopes(robot, 5.0, node=14) == pytest.approx(slopes, rel=1e-7)
 
 
-@EVERY_CABLE
-def test_fitted_slopes_lie_between_and_tend_to_the_exact_ones(cable):
-    robot = robot_with(cable)
+@EVERY_MODEL
+def test_fitted_slopes_lie_between_and_tend_to_the_exact_ones(model):
+    robot = robot_with(model)
     fitted, low, high = fitted_slopes(robot, 2.0, 6.0), tip_slopes(robot, 2.0), tip_slopes(robot, 6.0)
     assert np.all((np.minimum(low, high) <= fitted) & (fitted <= np.maximum(low, high)))
     assert fitted_slopes(robot, 3.999, 4.001) == pytest.approx(tip_slopes(robot, 4.0), rel=1e-6)
@@ -47,10 +47,10 @@ def test_fitted_slopes_lie_between_and_tend_to_the_exact_ones(cable):
         fitted_slopes(robot, 5, 2)
 
 
-@EVERY_CABLE
-def test_clearance_is_the_smallest_gap_of_the_free_robot(cable):
+@EVERY_MODEL
+def test_clearance_is_the_smallest_gap_of_the_free_robot(model):
     scene = Scene([Circle(center=(44, 104), radius=15), HalfPlane(point=(31, 127), normal=(-1, 0), nodes=(14,))])
-    rest = Solver(robot_with(cable), scene).rest()
+    rest = Solver(robot_with(model), scene).rest()
     assert clearance(rest.robot, scene, 0.0) == pytest.approx(rest.gaps.min(), abs=1e-12)
     assert clearance(rest.robot, Scene(), 3.0) == math.inf
 

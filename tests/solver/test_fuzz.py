@@ -20,16 +20,16 @@ from solver import (
     ReferenceSolver,
     Robot,
     Scene,
+    Sensitivity,
     Solver,
     Status,
-    forces,
-    free,
     spatial,
 )
 from solver import sensitivity as sensitivities
-from solver.batch import BatchSolver
-from solver.memo import TransitionMemo
-from solver.spatial import SpatialBatchSolver, SpatialEquilibrium, SpatialRobot, SpatialSolver
+from solver.cache.memo import TransitionMemo
+from solver.planar import forces, free
+from solver.planar.batch import BatchSolver
+from solver.spatial import SpatialBatchSolver, SpatialEquilibrium, SpatialRobot, SpatialSensitivity, SpatialSolver
 from solver.spatial import forces as spatial_forces
 from solver.spatial import sensitivity as spatial_sensitivities
 
@@ -156,7 +156,7 @@ def test_robots(case):
     robot = survives(kind, **arguments)
     if robot is None:
         return
-    assert np.isfinite([robot.stiffness, robot.rigidity / robot.length_mm**2, *robot.edges_mm]).all()
+    assert np.isfinite([robot.energy_scale, robot.rigidity / robot.length_mm**2, *robot.edges_mm]).all()
     assert np.isfinite(robot.lines_mm).all()
     if robot.positions > 2000:
         return
@@ -221,10 +221,10 @@ def test_functions(first, second, third):
     survives(free.clearance, ROBOT, SCENE, third)
     survives(sensitivities.sensitivity, first)
     survives(sensitivities.sensitivity, PULLED, second)
-    survives(sensitivities.obstacle_rows, third)
+    survives(Sensitivity.obstacle_rows, third)
     survives(spatial_sensitivities.spatial_sensitivity, first)
     survives(spatial_sensitivities.spatial_sensitivity, SPATIAL_PULLED, second)
-    survives(spatial_sensitivities.obstacle_rows, third)
+    survives(SpatialSensitivity.obstacle_rows, third)
 
 
 def make_batch(spatially):
@@ -256,11 +256,11 @@ def test_batches(spatially, first, second, third):
         lambda: batch.probe(first),
         lambda: batch.scene(second),
         lambda: check(batch.equilibrium(third)),
-        lambda: batch.reaches(first, [0.1], 0.5, 8.0),
-        lambda: batch.reaches([1], first, 0.5, 8.0),
-        lambda: batch.reaches([1], [0.1], first, second),
-        lambda: batch.reaches([1], [0.1], 0.5, 8.0, third),
-        lambda: batch.reaches([1], [0.1], 0.5, 8.0, None, third),
+        lambda: batch.ramp_reaches_force(first, [0.1], 0.5, 8.0),
+        lambda: batch.ramp_reaches_force([1], first, 0.5, 8.0),
+        lambda: batch.ramp_reaches_force([1], [0.1], first, second),
+        lambda: batch.ramp_reaches_force([1], [0.1], 0.5, 8.0, third),
+        lambda: batch.ramp_reaches_force([1], [0.1], 0.5, 8.0, None, third),
         lambda: type(batch)(first, 2, 1),
         lambda: type(batch)(batch.robot, first, 1),
         lambda: type(batch)(batch.robot, 2, second),

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
-from solver.robot import CABLES
+from solver.planar.robot import MODELS
 
 LENGTHS = {"length_mm": 120, "length_range_mm": (60, 200)}
-EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
-def robot_with(cable, **changes):
-    return replace(Robot.prototype(), **LENGTHS, cable=cable, **changes)
+def robot_with(model, **changes):
+    return replace(Robot.prototype(), **LENGTHS, model=model, **changes)
 
 
 def inserted(solver, *commands):
@@ -23,19 +23,19 @@ def inserted(solver, *commands):
     return equilibrium
 
 
-@EVERY_CABLE
-def test_free_robot_grows_and_shrinks(cable):
-    solver = Solver(robot_with(cable), Scene())
+@EVERY_MODEL
+def test_free_robot_grows_and_shrinks(model):
+    solver = Solver(robot_with(model), Scene())
     long, short = inserted(solver, (6.0, 180)), inserted(solver, (6.0, 180), (6.0, 90))
     assert long.length_mm == 180
     assert short.length_mm == 90
-    assert short.stiffness == pytest.approx(2 * long.stiffness)
+    assert short.energy_scale == pytest.approx(2 * long.energy_scale)
     assert np.array_equal(solver.step(short, 0.0, 120).block, solver.rest().block)
 
 
-@EVERY_CABLE
-def test_inserted_past_a_circle(cable):
-    solver = Solver(robot_with(cable), Scene([Circle(center=(42, 120), radius=12)]))
+@EVERY_MODEL
+def test_inserted_past_a_circle(model):
+    solver = Solver(robot_with(model), Scene([Circle(center=(42, 120), radius=12)]))
     states = [solver.step(solver.rest(), 6.0, 120)]
     for length in range(122, 190, 2):
         states.append(solver.step(states[-1], 6.0, length))
@@ -48,7 +48,7 @@ def test_inserted_past_a_circle(cable):
 def test_cable_goes_slack_where_the_wall_bends_the_robot_more():
     """A wall ahead that leans to the cable's side shortens the cable's way by itself."""
     wall = HalfPlane(point=(0, 150), normal=(0.3, -1))
-    solver = Solver(robot_with("sliding"), Scene([wall]))
+    solver = Solver(robot_with("rod"), Scene([wall]))
     slack = inserted(solver, (0.0, 148), (0.0, 180))
     assert slack.status is Status.CONVERGED
     assert slack.tension == 0
@@ -60,7 +60,7 @@ def test_cable_goes_slack_where_the_wall_bends_the_robot_more():
 
 
 def test_cable_holds_where_the_wall_bends_the_robot_the_other_way():
-    solver = Solver(robot_with("sliding", max_tension=3.0), Scene([HalfPlane(point=(0, 150), normal=(-0.3, -1))]))
+    solver = Solver(robot_with("rod", max_tension=3.0), Scene([HalfPlane(point=(0, 150), normal=(-0.3, -1))]))
     held = inserted(solver, (0.0, 148), (0.0, 180))
     assert held.status is Status.STALLED
     assert held.tension == pytest.approx(3.0, rel=1e-6)
@@ -69,10 +69,10 @@ def test_cable_holds_where_the_wall_bends_the_robot_the_other_way():
     assert solver.step(held, 0.0, 148).status is Status.CONVERGED
 
 
-@EVERY_CABLE
-def test_straight_robot_is_blocked_head_on(cable):
+@EVERY_MODEL
+def test_straight_robot_is_blocked_head_on(model):
     """Nothing tells it which way to give."""
-    solver = Solver(robot_with(cable), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
+    solver = Solver(robot_with(model), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
     blocked = inserted(solver, (0.0, 155))
     assert blocked.status is Status.BLOCKED
     assert blocked.length_mm == pytest.approx(150, abs=1e-3)
@@ -80,14 +80,14 @@ def test_straight_robot_is_blocked_head_on(cable):
 
 
 def test_buckled_robot_is_pulled_back_straight():
-    solver = Solver(robot_with("sliding"), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
+    solver = Solver(robot_with("rod"), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
     buckled = inserted(solver, (3.0, 120), (3.0, 180), (0.0, 180))
     assert buckled.nodes[-1, 0] > 50
     assert np.array_equal(solver.step(buckled, 0.0, 120).block, solver.rest().block)
 
 
 def test_length_out_of_range_is_refused():
-    solver = Solver(robot_with("uniform"), Scene())
+    solver = Solver(robot_with("paper"), Scene())
     for length in (59.9, 200.1, np.nan):
         with pytest.raises(ValueError, match=r"length_mm is .*; it must be from 60 to 200"):
             solver.step(solver.rest(), 1.0, length)

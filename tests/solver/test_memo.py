@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Circle, Robot, Scene, Solver
-from solver.memo import TransitionMemo
+from solver.cache.memo import TransitionMemo
 
 SCENE = Scene([Circle(center=(44, 104), radius=15)])
 CABLES = [0.5 * k for k in range(1, 17)]

@@ -65,12 +65,12 @@ def test_other_scales_give_the_same_robot(model, s, episodes):
 @pytest.mark.parametrize(
     "obstacle",
     [
-        Circle(center=(40, 90), radius=9, stiffness=2),
+        Circle(center=(40, 90), radius=9, spring=2),
         HalfPlane(point=(40, 90), normal=(-1, 0.3)),
         Ellipse(center=(40, 90), radii=(12, 7), axis=(1, 2)),
         Capsule(start=(40, 90), end=(50, 80), radius=7),
         Polygon(corners=((30, 80), (50, 80), (40, 100)), radius=3),
-        Custom(family=OVAL, sizes=(9, 7), center=(40, 90), reach=14, stiffness=((1, 0.2), (0.2, 3))),
+        Custom(family=OVAL, sizes=(9, 7), center=(40, 90), reach=14, spring=((1, 0.2), (0.2, 3))),
         spatial.Sphere(center=(40, 0, 90), radius=9),
         spatial.HalfSpace(point=(40, 0, 90), normal=(-1, 0, 0.3)),
         spatial.Capsule(start=(40, 0, 90), end=(50, 3, 80), radius=7),
@@ -83,5 +83,5 @@ def test_gaps_scale_to_the_last_bit(obstacle, s):
     points = np.random.default_rng(0).uniform(0, 120, (200, obstacle.space))
     large = scale_obstacle(obstacle, s)
     np.testing.assert_array_equal(large.gap(s * points), s * obstacle.gap(points))
-    np.testing.assert_array_equal(large.stiffness_matrix, obstacle.stiffness_matrix / s)
+    np.testing.assert_array_equal(large.spring_matrix, obstacle.spring_matrix / s)
     assert large.extent.radius == s * obstacle.extent.radius

@@ -5,16 +5,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver
-from solver.forces import force_true
-from solver.robot import CABLES, LINES
-from solver.sensitivity import CABLE, LENGTH, obstacle_rows, sensitivity
+from solver import (
+    Capsule,
+    Circle,
+    Custom,
+    Ellipse,
+    Family,
+    HalfPlane,
+    Polygon,
+    Robot,
+    Scene,
+    Sensitivity,
+    Solver,
+    sensitivity,
+)
+from solver.planar.forces import force_true
+from solver.planar.robot import LINES, MODELS
 
 ROBOT = Robot(
     length_mm=180, segments=18, offset_mm=8, touch=LINES, between=1, max_tension=100, length_range_mm=(170, 190)
 )
-ROBOTS = [replace(ROBOT, cable=cable) for cable in CABLES]
-EVERY_ROBOT = pytest.mark.parametrize("robot", ROBOTS, ids=CABLES)
+ROBOTS = [replace(ROBOT, model=model) for model in MODELS]
+EVERY_ROBOT = pytest.mark.parametrize("robot", ROBOTS, ids=MODELS)
 OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
 PUSHED = [
     Circle(center=(44, 104), radius=15),
@@ -27,13 +39,13 @@ PUSHED = [
 SCENES = [
     *([obstacle] for obstacle in PUSHED),
     [Circle(center=(33, 89), radius=12.5), Circle(center=(59, 140), radius=15)],
-    *([replace(obstacle, stiffness=((0.4, 0.1), (0.1, 0.2)))] for obstacle in PUSHED),
-    [Circle(center=(33, 89), radius=12.5, stiffness=1.0), Circle(center=(59, 140), radius=15)],
+    *([replace(obstacle, spring=((0.4, 0.1), (0.1, 0.2)))] for obstacle in PUSHED),
+    [Circle(center=(33, 89), radius=12.5, spring=1.0), Circle(center=(59, 140), radius=15)],
 ]
 EVERY_SCENE = pytest.mark.parametrize(
     "obstacles",
     SCENES,
-    ids=lambda scene: "+".join(o.kind + ("" if o.stiffness is None else " on a spring") for o in scene),
+    ids=lambda scene: "+".join(o.kind + ("" if o.spring is None else " on a spring") for o in scene),
 )
 CABLE_MM, STEP = 9.0, 1e-4
 
@@ -107,8 +119,12 @@ def test_cable_and_length(robot, obstacles):
     equilibrium = solve(robot, obstacles)
     assert equilibrium.contact.any()
     slopes = sensitivity(equilibrium)
-    compare(slopes, CABLE, solve(robot, obstacles, CABLE_MM + STEP), solve(robot, obstacles, CABLE_MM - STEP))
-    compare(slopes, LENGTH, *(solve(robot, obstacles, length=length) for length in (180 + STEP, 180 - STEP)))
+    compare(
+        slopes, Sensitivity.CABLE, solve(robot, obstacles, CABLE_MM + STEP), solve(robot, obstacles, CABLE_MM - STEP)
+    )
+    compare(
+        slopes, Sensitivity.LENGTH, *(solve(robot, obstacles, length=length) for length in (180 + STEP, 180 - STEP))
+    )
 
 
 @EVERY_ROBOT
@@ -124,14 +140,14 @@ def test_obstacles(robot, obstacles, motion):
             arguments = [0.0] * 4
             arguments[motion] = change
             both.append(solve(robot, [moved(o, *arguments) if k == j else o for k, o in enumerate(obstacles)]))
-        compare(slopes, obstacle_rows(j).start + motion, *both)
+        compare(slopes, Sensitivity.obstacle_rows(j).start + motion, *both)
 
 
 @EVERY_ROBOT
 def test_free_robot(robot):
     solver = Solver(robot, Scene())
     ahead, here, behind = (solver.step(solver.rest(), cable) for cable in (5 + STEP, 5.0, 5 - STEP))
-    compare(sensitivity(here), CABLE, ahead, behind)
+    compare(sensitivity(here), Sensitivity.CABLE, ahead, behind)
 
 
 def test_contact_about_to_open_is_taken_from_either_side():
@@ -141,8 +157,8 @@ def test_contact_about_to_open_is_taken_from_either_side():
     nearest = np.unravel_index(equilibrium.gaps.argmin(), equilibrium.gaps.shape)
     pressed = np.zeros_like(equilibrium.contact)
     pressed[nearest] = True
-    assert not sensitivity(equilibrium).forces[CABLE].any()
-    assert sensitivity(equilibrium, pressed).multipliers[CABLE][nearest] > 0
+    assert not sensitivity(equilibrium).forces[Sensitivity.CABLE].any()
+    assert sensitivity(equilibrium, pressed).multipliers[Sensitivity.CABLE][nearest] > 0
 
 
 def test_slack_cable_and_foreign_contacts_are_refused():

@@ -9,18 +9,18 @@ from soak.episodes import STEPS, Episode, play
 from soak.report import Tally
 
 from solver import Capsule, Circle, Robot, Scene, Solver
-from solver.robot import CABLES
+from solver.planar.robot import MODELS
 
 SHORT = 3000
 ROBOT = Robot.prototype()
 LINE = replace(ROBOT, touch=("backbone",))
 
 
-@pytest.mark.parametrize("cable", CABLES)
-def test_nothing_is_found_in_random_episodes(cable):
+@pytest.mark.parametrize("model", MODELS)
+def test_nothing_is_found_in_random_episodes(model):
     tally, cases = Tally(), []
     for index in range(SHORT // STEPS):
-        counted, found = play(Episode(cable, 1, index))
+        counted, found = play(Episode(model, 1, index))
         tally.add(counted)
         cases += found
     assert cases == []
@@ -32,7 +32,7 @@ def test_nothing_is_found_in_random_episodes(cable):
 
 
 def test_an_episode_follows_from_its_seed():
-    first, again = (play(Episode("uniform", 3, 4))[0] for _ in range(2))
+    first, again = (play(Episode("paper", 3, 4))[0] for _ in range(2))
     assert first == again
 
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
-from solver.forces import force_true
-from solver.free import free_nodes
-from solver.robot import CABLES
+from solver.planar.forces import force_true
+from solver.planar.free import free_nodes
+from solver.planar.robot import MODELS
 
 CIRCLE = Circle(center=(44, 104), radius=15)
-EVERY_CABLE = pytest.mark.parametrize("cable", CABLES)
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
-def pulled(cable, *obstacles, to=9.0):
-    solver = Solver(replace(Robot.prototype(), cable=cable), Scene(obstacles))
+def pulled(model, *obstacles, to=9.0):
+    solver = Solver(replace(Robot.prototype(), model=model), Scene(obstacles))
     equilibrium = solver.rest()
     for command in np.linspace(0, to, 37)[1:]:
         equilibrium = solver.step(equilibrium, command)
@@ -23,39 +23,39 @@ def pulled(cable, *obstacles, to=9.0):
     return equilibrium
 
 
-@EVERY_CABLE
-@pytest.mark.parametrize("stiffness", [0.05, 1.0, ((3.0, 0.9), (0.9, 0.4))])
-def test_spring_carries_the_contact_force(cable, stiffness):
-    obstacle = replace(CIRCLE, stiffness=stiffness)
-    equilibrium = pulled(cable, obstacle)
+@EVERY_MODEL
+@pytest.mark.parametrize("spring", [0.05, 1.0, ((3.0, 0.9), (0.9, 0.4))])
+def test_spring_carries_the_contact_force(model, spring):
+    obstacle = replace(CIRCLE, spring=spring)
+    equilibrium = pulled(model, obstacle)
     (force,), (displacement,) = force_true(equilibrium), equilibrium.displacements
     assert np.linalg.norm(force) > 0.01
-    assert obstacle.stiffness_matrix @ displacement == pytest.approx(-force, abs=1e-10)
+    assert obstacle.spring_matrix @ displacement == pytest.approx(-force, abs=1e-10)
 
 
-@EVERY_CABLE
-def test_stiff_spring_is_a_fixed_obstacle(cable):
-    fixed, stiff = pulled(cable, CIRCLE), pulled(cable, replace(CIRCLE, stiffness=1e6))
+@EVERY_MODEL
+def test_stiff_spring_is_a_fixed_obstacle(model):
+    fixed, stiff = pulled(model, CIRCLE), pulled(model, replace(CIRCLE, spring=1e6))
     assert stiff.nodes == pytest.approx(fixed.nodes, abs=1e-4)
     assert force_true(stiff) == pytest.approx(force_true(fixed), rel=1e-4)
 
 
-@EVERY_CABLE
-def test_soft_spring_hardly_bends_the_robot(cable):
-    equilibrium = pulled(cable, replace(CIRCLE, stiffness=1e-6))
+@EVERY_MODEL
+def test_soft_spring_hardly_bends_the_robot(model):
+    equilibrium = pulled(model, replace(CIRCLE, spring=1e-6))
     assert equilibrium.contact.any()
     assert equilibrium.nodes == pytest.approx(free_nodes(equilibrium.robot, 9.0), abs=0.02)
 
 
 def test_softer_springs_give_more_and_push_less():
-    states = [pulled("uniform", replace(CIRCLE, stiffness=stiffness)) for stiffness in (10, 1, 0.1, 0.01)]
+    states = [pulled("paper", replace(CIRCLE, spring=spring)) for spring in (10, 1, 0.1, 0.01)]
     assert np.all(np.diff([np.linalg.norm(state.displacements) for state in states]) > 0)
     assert np.all(np.diff([np.linalg.norm(force_true(state)) for state in states]) < 0)
 
 
 def test_wall_moves_along_its_normal_only():
-    wall = HalfPlane(point=(31, 127), normal=(-1, 0), nodes=(14,), stiffness=0.5)
-    equilibrium = pulled("uniform", wall)
+    wall = HalfPlane(point=(31, 127), normal=(-1, 0), nodes=(14,), spring=0.5)
+    equilibrium = pulled("paper", wall)
     assert equilibrium.displacements[0, 0] > 0.1
     assert equilibrium.displacements[0, 1] == 0
     assert (
@@ -66,30 +66,30 @@ def test_wall_moves_along_its_normal_only():
 
 
 def test_obstacles_where_they_have_been_pushed_to():
-    equilibrium = pulled("uniform", replace(CIRCLE, stiffness=0.2))
+    equilibrium = pulled("paper", replace(CIRCLE, spring=0.2))
     (circle,), (displacement,) = equilibrium.scene_now, equilibrium.displacements
     assert circle.center == pytest.approx(CIRCLE.center + displacement)
     assert circle.gap(equilibrium.points) == pytest.approx(equilibrium.gaps[0], abs=1e-12)
 
 
 def test_let_go_the_obstacle_returns_to_its_place():
-    solver = Solver(Robot.prototype(), Scene([replace(CIRCLE, stiffness=0.2)]))
+    solver = Solver(Robot.prototype(), Scene([replace(CIRCLE, spring=0.2)]))
     pushed = solver.step(solver.rest(), 8.0)
     assert pushed.displacements.any()
     assert np.array_equal(solver.step(pushed, 0.0).block, solver.rest().block)
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "message"),
+    ("spring", "message"),
     [
-        (0.0, "stiffness is 0.0; it must be positive and finite"),
-        (np.inf, "stiffness is inf; it must be positive and finite"),
+        (0.0, "spring is 0.0; it must be positive and finite"),
+        (np.inf, "spring is inf; it must be positive and finite"),
         (((1, 0.5), (0.4, 1)), "it must be finite, symmetric and positive definite"),
         (((1, 2), (2, 1)), "it must be finite, symmetric and positive definite"),
         ((1, 2, 3), "it must be a number or a matrix"),
-        ("soft", "stiffness is 'soft'; it must be a number or a matrix"),
+        ("soft", "spring is 'soft'; it must be a number or a matrix"),
     ],
 )
-def test_bad_stiffness_is_refused(stiffness, message):
+def test_bad_stiffness_is_refused(spring, message):
     with pytest.raises(ValueError, match=message):
-        replace(CIRCLE, stiffness=stiffness)
+        replace(CIRCLE, spring=spring)

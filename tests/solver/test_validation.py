@@ -21,12 +21,11 @@ from solver import (
     Scene,
     Solver,
     Status,
-    forces,
-    free,
 )
-from solver.batch import BatchSolver
-from solver.memo import TransitionMemo
-from solver.sensitivity import sensitivity
+from solver.cache.memo import TransitionMemo
+from solver.planar import forces, free
+from solver.planar.batch import BatchSolver
+from solver.planar.sensitivity import sensitivity
 from solver.spatial import SpatialRobot, Sphere
 
 PROTOTYPE = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0}
@@ -46,7 +45,7 @@ PROTOTYPE = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0}
         ({"max_cable_mm": -1.0}, "max_cable_mm is -1.0; it must be positive and finite"),
         ({"max_cable_mm": 200.0}, "max_cable_mm is 200.0; it must be below 180.0"),
         ({"max_cable_mm": 110.0, "length_range_mm": (100, 200)}, "max_cable_mm is 110.0; it must be below 100.0"),
-        ({"cable": "slack"}, "cable is 'slack'; it must be one of uniform, sliding"),
+        ({"model": "slack"}, "model is 'slack'; it must be one of paper, rod"),
         ({"length_range_mm": (0, 200)}, "a bound of length_range_mm is 0; it must be positive and finite"),
         ({"length_range_mm": (190, 200)}, r"length_mm is 180.0; it must lie in length_range_mm \(190.0, 200.0\)"),
         ({"length_range_mm": 200}, "length_range_mm is 200; it must be a pair"),
@@ -150,8 +149,8 @@ def test_scene():
             "radius of Polygon.* is 1e-09 mm; it must be at least 1.8e-07 mm",
         ),
         (Ellipse(center=(1e4, 100), radii=(1e4, 0.01)), "the sharpest radius of Ellipse.* is 1e-08 mm; it must be at"),
-        (Circle(center=(50, 100), radius=15, stiffness=1e9), "stiffness is from 1e.* it must be from .* fix a stiffer"),
-        (Circle(center=(50, 100), radius=15, stiffness=1e-20), "leave out a softer obstacle"),
+        (Circle(center=(50, 100), radius=15, spring=1e9), "spring is from 1e.* it must be from .* fix a stiffer"),
+        (Circle(center=(50, 100), radius=15, spring=1e-20), "leave out a softer obstacle"),
     ],
 )
 def test_obstacle_of_a_solver(obstacle, message):
@@ -231,7 +230,7 @@ def test_what_is_no_equilibrium():
         (lambda robot: Circle(center=(40, 100), radius=9).gap([1j, 2]), "points is .*, not complex"),
         (lambda robot: Circle(center=(40, 100), radius=9).gap([1, math.nan]), "points is .*; all must be finite"),
         (
-            lambda robot: Circle(center=(40, 100), radius=9, stiffness=((1, 0), (0, 1e-12))),
+            lambda robot: Circle(center=(40, 100), radius=9, spring=((1, 0), (0, 1e-12))),
             "its softest direction must",
         ),
         (lambda robot: Circle(center=(40, 100), radius=9).shifted((1, 2, 3)), "by is .*; it must be a pair"),
@@ -388,7 +387,7 @@ def test_robots_that_a_batch_does_not_have(batch, robots):
     before = batch.blocks.copy()
     for call in (
         lambda: batch.rest(robots),
-        lambda: batch.reaches(robots, np.full(np.size(robots), 0.1), 0.5, 8.0),
+        lambda: batch.ramp_reaches_force(robots, np.full(np.size(robots), 0.1), 0.5, 8.0),
         lambda: batch.step(np.full(np.size(robots), 3.0), [1.5] if robots is None else robots),
     ):
         with pytest.raises(ValueError, match=r"robots? is .*; it must|the index of a robot is .*; it must be a whole"):
@@ -438,9 +437,9 @@ def test_whole_commands_and_no_robots(batch):
 )
 def test_trial_pulls(batch, change, message):
     pull = {"robots": range(4), "forces": np.full(4, 0.01), "increment_mm": 0.5, "limit_mm": 14.0}
-    assert batch.reaches(**pull)[0].any()
+    assert batch.ramp_reaches_force(**pull)[0].any()
     with pytest.raises(ValueError, match=message):
-        batch.reaches(**{**pull, **change})
+        batch.ramp_reaches_force(**{**pull, **change})
 
 
 @pytest.mark.parametrize(
@@ -469,7 +468,7 @@ def test_a_batch_answers_only_for_robots_that_are_assigned(circles):
     batch.assign(0, circles((44, 104, 15)))
     for call in (
         lambda: batch.rest([0, 1]),
-        lambda: batch.reaches([1], [0.1], 0.5, 8.0),
+        lambda: batch.ramp_reaches_force([1], [0.1], 0.5, 8.0),
         lambda: batch.move(1),
         lambda: batch.equilibrium(1),
     ):

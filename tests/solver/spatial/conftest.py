@@ -22,20 +22,20 @@ def random_shape(generator):
     center = generator.uniform(35, 75) * outward + [0.0, 0.0, generator.uniform(75, 150)]
     axis, second = generator.normal(size=(2, 3))
     axis /= np.linalg.norm(axis)
-    stiffness = float(np.exp(generator.uniform(-3, 1))) if generator.random() < 0.3 else None
+    spring = float(np.exp(generator.uniform(-3, 1))) if generator.random() < 0.3 else None
     match generator.integers(5):
         case 0:
-            return Sphere(center=center, radius=radius, stiffness=stiffness)
+            return Sphere(center=center, radius=radius, spring=spring)
         case 1:
-            return Capsule(start=center - 15 * axis, end=center + 15 * axis, radius=0.7 * radius, stiffness=stiffness)
+            return Capsule(start=center - 15 * axis, end=center + 15 * axis, radius=0.7 * radius, spring=spring)
         case 2:
             ends = {"start": center - 15 * axis, "end": center + 15 * axis}
-            return Cylinder(**ends, radius=0.8 * radius, edge=2, stiffness=stiffness)
+            return Cylinder(**ends, radius=0.8 * radius, edge=2, spring=spring)
         case 3:
             sizes = generator.uniform(14, 30, 3)
-            return Box(center=center, sizes=sizes, edge=2, axis=axis, second=second, stiffness=stiffness)
+            return Box(center=center, sizes=sizes, edge=2, axis=axis, second=second, spring=spring)
         case _:
-            return HalfSpace(point=center, normal=0.3 * axis - outward, stiffness=stiffness)
+            return HalfSpace(point=center, normal=0.3 * axis - outward, spring=spring)
 
 
 def random_solver(generator, robot):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver import HalfPlane, Robot, Scene, Solver
-from solver.forces import VirtualWork
+from solver.planar.forces import VirtualWork
 from solver.spatial import HalfSpace, SpatialSolver, Sphere
 from solver.spatial.forces import SpatialVirtualWork, force_true, with_friction
 
@@ -20,7 +20,7 @@ def test_forces_follow_from_the_multipliers(pressed):
     total = np.zeros(3)
     for _, line, position in np.argwhere(pressed.contact):
         normal = SPHERE.normal_at(pressed.points[line, position])
-        total += pressed.stiffness * pressed.multipliers[0, line, position] * normal
+        total += pressed.energy_scale * pressed.multipliers[0, line, position] * normal
     assert force_true(pressed)[0] == pytest.approx(total, abs=1e-12)
     assert np.linalg.norm(total) > 0.01
 
@@ -36,8 +36,8 @@ def test_forces_and_tensions_do_the_work_that_the_energy_takes(pressed, robot):
     generator = np.random.default_rng(0)
     for pulls in generator.normal(size=(10, 2)):
         motion = np.linalg.lstsq(held, pulls @ shortening, rcond=None)[0] + generator.normal(size=len(null)) @ null
-        work = pressed.stiffness * float(pressed.multipliers[:, :, 1:].ravel() @ (gap_slopes @ motion))
-        change = pressed.stiffness * float(slope.ravel() @ motion)
+        work = pressed.energy_scale * float(pressed.multipliers[:, :, 1:].ravel() @ (gap_slopes @ motion))
+        change = pressed.energy_scale * float(slope.ravel() @ motion)
         assert change == pytest.approx(float(pressed.tensions @ pulls) + work, abs=1e-8)
 
 

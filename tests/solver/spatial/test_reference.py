@@ -13,10 +13,10 @@ from solver.spatial.formulation import spatial_problem
 SPRING = ((0.3, 0.1, 0), (0.1, 0.5, 0), (0, 0, 0.2))
 SCENES = {
     "sphere": ((1.0, 0.4), [Sphere(center=(40, 18, 104), radius=15)]),
-    "opposite cables": ((-0.4, -1.0), [Sphere(center=(-18, -40, 104), radius=15, stiffness=0.3)]),
+    "opposite cables": ((-0.4, -1.0), [Sphere(center=(-18, -40, 104), radius=15, spring=0.3)]),
     "capsule on a spring": (
         (-1.0, 0.4),
-        [Capsule(start=(-40, -20, 100), end=(-30, 40, 95), radius=9, stiffness=SPRING)],
+        [Capsule(start=(-40, -20, 100), end=(-30, 40, 95), radius=9, spring=SPRING)],
     ),
     "cylinder and box": (
         (0.8, 0.8),

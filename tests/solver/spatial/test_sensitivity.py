@@ -7,8 +7,17 @@ import numpy as np
 import pytest
 
 from solver import Scene
-from solver.spatial import Box, Capsule, Cylinder, HalfSpace, SpatialRobot, SpatialSolver, Sphere
-from solver.spatial.sensitivity import LENGTH, obstacle_rows, spatial_sensitivity
+from solver.spatial import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    SpatialRobot,
+    SpatialSensitivity,
+    SpatialSolver,
+    Sphere,
+    spatial_sensitivity,
+)
 
 ROBOT = SpatialRobot(length_mm=180, segments=18, offset_mm=8, angle=1.8, max_tension=100, between=1)
 SPRING = ((0.4, 0.1, 0.0), (0.1, 0.2, 0.05), (0.0, 0.05, 0.3))
@@ -19,7 +28,7 @@ PUSHED = [
     Box(center=(40, 18, 104), sizes=(26, 30, 28), edge=6, axis=(1, 0.3, 0.2)),
     HalfSpace(point=(31, 12, 127), normal=(-1, -0.3, 0.2), nodes=(14,)),
 ]
-SCENES = [*([o] for o in PUSHED), *([replace(o, stiffness=SPRING)] for o in PUSHED)]
+SCENES = [*([o] for o in PUSHED), *([replace(o, spring=SPRING)] for o in PUSHED)]
 COMMAND, STEP = np.array([7.0, 3.0]), 1e-4
 
 
@@ -76,17 +85,15 @@ def compare(slopes, row, ahead, behind):
     assert slopes.turns[row] == pytest.approx(turns, rel=1e-5, abs=1e-8 + 1e-5 * np.abs(turns).max())
 
 
-@pytest.mark.parametrize(
-    "obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].stiffness is None else " on a spring")
-)
+@pytest.mark.parametrize("obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].spring is None else " on a spring"))
 def test_everything(obstacles):
     equilibrium = solve(obstacles)
     assert equilibrium.contact.any()
     slopes = spatial_sensitivity(equilibrium)
     for row, change in enumerate(STEP * np.eye(2)):
         compare(slopes, row, solve(obstacles, COMMAND + change), solve(obstacles, COMMAND - change))
-    compare(slopes, LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
-    first = obstacle_rows(0).start
+    compare(slopes, SpatialSensitivity.LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
+    first = SpatialSensitivity.obstacle_rows(0).start
     motions = [
         *(lambda by, axis=axis: {"shift": by * axis} for axis in np.eye(3)),
         *(lambda by, axis=axis: {"axis": axis, "turn": by} for axis in range(3)),

@@ -19,8 +19,8 @@ IN_PLANE = {
         Circle(center=(44, 104), radius=15),
     ),
     "spring": (
-        Sphere(center=(44, 0, 104), radius=15, stiffness=0.4),
-        Circle(center=(44, 104), radius=15, stiffness=0.4),
+        Sphere(center=(44, 0, 104), radius=15, spring=0.4),
+        Circle(center=(44, 104), radius=15, spring=0.4),
     ),
 }
 
@@ -217,7 +217,7 @@ def test_a_pull_towards_a_sphere_reaches_a_force(robot):
     for index in range(2):
         batch.assign(index, Scene([SPHERE]))
     towards = np.array([[0.91, 0.41], [-0.91, -0.41]])
-    found, forces = batch.reaches([0, 1], np.array([0.01, 0.01]), 0.5, 10.0, towards)
+    found, forces = batch.ramp_reaches_force([0, 1], np.array([0.01, 0.01]), 0.5, 10.0, towards)
     assert list(found) == [True, False]
     assert list(np.linalg.norm(forces, axis=1) >= 0.01) == [True, False]
 
@@ -234,7 +234,7 @@ def test_a_pull_towards_a_sphere_reaches_a_force(robot):
         (lambda: SpatialRobot(length_mm=180, segments=18, offset_mm=8, between=-1), "between is -1"),
         (lambda: Sphere(center=(1, 2, math.inf), radius=3), "center is"),
         (lambda: Sphere(center=(1, 2), radius=3), "three coordinates"),
-        (lambda: Sphere(center=(1, 2, 3), radius=3, stiffness=((1, 0), (0, 1))), "of three rows"),
+        (lambda: Sphere(center=(1, 2, 3), radius=3, spring=((1, 0), (0, 1))), "of three rows"),
         (lambda: HalfSpace(point=(1, 2, 3), normal=(0, 0, 0)), "normal is"),
         (lambda: Cylinder(start=(1, 2, 3), end=(1, 2, 9), radius=3, edge=4), "edge is 4"),
         (lambda: Cylinder(start=(1, 2, 3), end=(1, 2, 3), radius=3), "start and end"),

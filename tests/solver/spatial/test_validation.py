@@ -71,7 +71,7 @@ def test_angles_that_are_taken(angle):
             Box(center=(50, 0, 110), sizes=(20, 20, 20), edge=1e-9),
             "edge of Box.* is 1e-09 mm; it must be at least",
         ),
-        (Sphere(center=(50, 0, 110), radius=15, stiffness=1e9), "stiffness is from 1e.* it must be from"),
+        (Sphere(center=(50, 0, 110), radius=15, spring=1e9), "spring is from 1e.* it must be from"),
     ],
 )
 def test_obstacle_of_a_solver(robot, obstacle, message):

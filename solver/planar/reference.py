@@ -9,48 +9,31 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from solver.equilibrium import Equilibrium
-from solver.forces import onset_tension
-from solver.formulation import limits, node_derivatives, node_problem
-from solver.free import free_angle, free_tension, tip_slopes
-from solver.geometry import touchable_points, touching_points
-from solver.layout import PLANE, layout
-from solver.robot import Robot
-from solver.scene import Scene
-from solver.solve import check_clear, check_command, check_core, check_scene
-from solver.status import Status
-
-# Displacements of the cable are over its offset a, places over the length L of the robot at its longest.
-LARGEST_STEP, SMALLEST_STEP = 0.03125, 0.00375  # of one solve, and of its last try [a]
-INSERTION = 11.25  # displacement that counts as much as an insertion by L [a]
-PRETENSION = 0.00625  # a touching robot is not slackened below it [a]
-SLACK = 1.25e-4  # below it a shear costs too little for IPOPT, and the robot is taken as free [a]
-TURN = 0.02  # unit of the angles of a robot with a sliding cable [rad]
-RESOLUTION = 1.25e-7  # to which the command at the tension limit is found [a]
-MOVE_OFFSET, MOVE_SLOPE = 0.0028, 0.71  # a node that moves farther than offset + slope·|step| has left the branch [L]
-
-OPTIONS: dict[str, Any] = {
-    "print_time": False,
-    "ipopt": {
-        "print_level": 0,
-        "sb": "yes",
-        "max_iter": 500,
-        "tol": 1e-11,
-        "dual_inf_tol": 1e-10,
-        "constr_viol_tol": 1e-11,
-        "compl_inf_tol": 1e-11,
-        "acceptable_iter": 0,
-        "bound_relax_factor": 0.0,
-        "nlp_scaling_method": "none",
-        "mu_init": 1e-9,
-        "warm_start_init_point": "yes",
-        "warm_start_bound_push": 1e-9,
-        "warm_start_bound_frac": 1e-9,
-        "warm_start_slack_bound_push": 1e-9,
-        "warm_start_slack_bound_frac": 1e-9,
-        "warm_start_mult_bound_push": 1e-9,
-    },
-}
+from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.geometry import touchable_points
+from solver.common.ipopt import (
+    INSERTION,
+    LARGEST_STEP,
+    MOVE_OFFSET,
+    MOVE_SLOPE,
+    OPTIONS,
+    PRETENSION,
+    RESOLUTION,
+    SLACK,
+    SMALLEST_STEP,
+    TURN,
+)
+from solver.common.layout import PLANE
+from solver.common.scene import Scene
+from solver.common.status import Status
+from solver.planar.equilibrium import Equilibrium
+from solver.planar.forces import onset_tension
+from solver.planar.formulation import limits, node_derivatives, node_problem
+from solver.planar.free import free_angle, free_tension, tip_slopes
+from solver.planar.geometry import touching_points
+from solver.planar.layout import layout
+from solver.planar.robot import Robot
+from solver.planar.solve import check_command
 
 
 class _Point(NamedTuple):
@@ -95,7 +78,7 @@ class ReferenceSolver:
         self.scene = scene
         self._touchable = touchable_points(robot, scene)
         check_core(robot, scene)
-        self._sliding = robot.cable == "sliding"
+        self._sliding = robot.model == "rod"
         self._limits = limits(robot)
         self._build()
         self._rest = self._equilibrium(self._free(0.0, robot.length_mm), Status.CONVERGED, 0)
@@ -120,7 +103,7 @@ class ReferenceSolver:
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
-        cable_mm, length = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+        cable_mm, length = self.check_command(equilibrium, cable_mm, length_mm)
         present, iterations, largest = self._start(equilibrium), 0, LARGEST_STEP
         while (distance := self._apart(present, cable := self._goal(present, cable_mm), length)) > 0:
             part = min(1.0, largest / distance)
@@ -197,23 +180,34 @@ class ReferenceSolver:
         angle = free_angle(robot, cable) if self._sliding else 0.0
         straight = np.zeros(2 * sum(self.scene.mounted))
         unknowns = np.r_[self._shape(cable, length, np.full(robot.segments, angle)), straight]
-        pushes = np.zeros(self._limits + self._touchable[:, :, 1:].size)
+        multipliers = np.zeros(self._limits + self._touchable[:, :, 1:].size)
         if self._sliding:
-            pushes[0] = free_tension(robot, cable) / robot.stiffness
-        return self._balanced(cable, length, unknowns, pushes)
+            multipliers[0] = free_tension(robot, cable) / robot.energy_scale
+        return self._balanced(cable, length, unknowns, multipliers)
 
-    def _balanced(self, cable: float, length: float, unknowns: np.ndarray, pushes: np.ndarray) -> _Point:
+    def _balanced(self, cable: float, length: float, unknowns: np.ndarray, multipliers: np.ndarray) -> _Point:
         """A shape with multipliers of its inequalities, and those of the equalities by least squares."""
         derivatives = node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
         values = derivatives(unknowns, self._parameters(cable, length))
         slope, _, equality_slopes, _, gap_slopes = (value.full() for value in values)
-        balance = gap_slopes.T @ pushes - slope.ravel()
+        balance = gap_slopes.T @ multipliers - slope.ravel()
         tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
-        return _Point(cable, length, unknowns, np.concatenate([tensions, -pushes]))
+        return _Point(cable, length, unknowns, np.concatenate([tensions, -multipliers]))
+
+    def check_command(
+        self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
+    ) -> tuple[float, float]:
+        """Return a command as floats; as :meth:`solver.Solver.check_command`.
+
+        Raises:
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is something else.
+        """
+        return check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
 
     def _start(self, equilibrium: Equilibrium) -> _Point:
-        unknowns, _, tensions, pushes = equilibrium.node_solution()
-        return _Point(equilibrium.cable_mm, equilibrium.length_mm, unknowns, -np.concatenate([tensions, pushes]))
+        unknowns, _, tensions, multipliers = equilibrium.node_solution()
+        return _Point(equilibrium.cable_mm, equilibrium.length_mm, unknowns, -np.concatenate([tensions, multipliers]))
 
     def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
         """The solution under another command, ``None`` where IPOPT does not converge to it or leaves the branch."""
@@ -309,8 +303,8 @@ class ReferenceSolver:
         points = touching_points(self.robot, nodes)
         for j, obstacle in enumerate(self.scene):
             normals = obstacle.normal_at(points - displacements[j])
-            stiffness = self.robot.at(point.length).stiffness
-            places.forces(block)[j] = stiffness * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
+            energy_scale = self.robot.at(point.length).energy_scale
+            places.forces(block)[j] = energy_scale * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
         places.force(block)[:] = places.forces(block).sum(axis=0)
         places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
         places.flags(block)[:] = (multipliers > 0).any(axis=0).ravel()

@@ -1,4 +1,4 @@
-"""The result of a solve: one equilibrium of the robot, immutable and complete."""
+"""The result of a solve: one equilibrium of a robot, immutable and complete."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -7,13 +7,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 import casadi as ca
 import numpy as np
 
-from solver.formulation import node_derivatives
-from solver.geometry import touching_points
-from solver.layout import CABLE, LENGTH, TENSION, Layout, layout
-from solver.robot import Robot
-from solver.scene import Scene
-from solver.status import Status
-from solver.validation import instance, shown, whole
+from solver.common.layout import Layout
+from solver.common.scene import Scene
+from solver.common.status import Status
+from solver.common.validation import instance, shown, whole
 
 STATUSES = tuple(Status)
 ROUNDING = 1e-6  # by which a node may be farther from the base than the length, over it
@@ -129,12 +126,12 @@ class BaseEquilibrium(ABC):
     @property
     def energy(self) -> float:
         """Elastic energy of the robot and of the springs that obstacles are mounted on [N·mm]."""
-        springs = [obstacle.stiffness_matrix for obstacle in self.scene]
+        springs = [obstacle.spring_matrix for obstacle in self.scene]
         moved = zip(self.displacements, springs, strict=True)
-        return self.stiffness * self.objective + sum(float(d @ spring @ d) / 2 for d, spring in moved)
+        return self.energy_scale * self.objective + sum(float(d @ spring @ d) / 2 for d, spring in moved)
 
     @property
-    def stiffness(self) -> float:
+    def energy_scale(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective J into energy."""
         return float(self.robot.rigidity * self.robot.segments / (2 * self.length_mm))
 
@@ -170,7 +167,7 @@ class BaseEquilibrium(ABC):
         return self.multipliers > 0
 
     @property
-    def pushes(self) -> np.ndarray:
+    def inequality_multipliers(self) -> np.ndarray:
         """Multipliers of the inequalities of the node-coordinate problem, ``(k,)`` [rad²/mm]."""
         return self.multipliers[:, :, 1:].ravel()
 
@@ -187,7 +184,7 @@ class BaseEquilibrium(ABC):
     @property
     @abstractmethod
     def _derivatives(self) -> ca.Function:
-        """:func:`~solver.formulation.first_derivatives` of the node-coordinate problem."""
+        """:func:`~solver.common.node_problem.first_derivatives` of the node-coordinate problem."""
 
     @abstractmethod
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
@@ -200,7 +197,7 @@ class BaseEquilibrium(ABC):
         """
         unknowns, parameters = self._node_point()
         balance, equality_slopes = self._balance(self._node_derivatives(unknowns, parameters))
-        return unknowns, parameters, _tensions(balance, equality_slopes), self.pushes
+        return unknowns, parameters, _tensions(balance, equality_slopes), self.inequality_multipliers
 
     def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
         return [value.full() for value in self._derivatives(unknowns, parameters)]
@@ -208,8 +205,10 @@ class BaseEquilibrium(ABC):
     def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Slope of the objective less the contact forces, and the slopes of the equalities that balance it."""
         slope, _, equality_slopes, _, gap_slopes = derivatives
-        pushes = self.pushes
-        return slope.ravel() - (gap_slopes.T @ pushes if pushes.size else 0.0), equality_slopes
+        inequality_multipliers = self.inequality_multipliers
+        return slope.ravel() - (
+            gap_slopes.T @ inequality_multipliers if inequality_multipliers.size else 0.0
+        ), equality_slopes
 
     def residuals(self) -> Residuals:
         """Recompute the optimality conditions of eq. 5 or 13 from the nodes and multipliers alone.
@@ -220,114 +219,17 @@ class BaseEquilibrium(ABC):
         derivatives = self._node_derivatives(*self._node_point())
         _, lengths, _, gaps, _ = derivatives
         balance, equality_slopes = self._balance(derivatives)
-        tensions, pushes = _tensions(balance, equality_slopes), self.pushes
+        tensions, inequality_multipliers = _tensions(balance, equality_slopes), self.inequality_multipliers
         touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
-        touchable = np.concatenate([np.ones(pushes.size - touchable.size, bool), touchable])
+        touchable = np.concatenate([np.ones(inequality_multipliers.size - touchable.size, bool), touchable])
         clearance = gaps.ravel()[touchable]
         return Residuals(
             stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
             lengths=float(np.abs(lengths).max()),
             gaps=float(max(0.0, -clearance.min(initial=0.0))),
-            complementarity=float(np.abs(pushes[touchable] * clearance).max(initial=0.0)),
-            sign=float(max(0.0, -pushes.min(initial=0.0))),
+            complementarity=float(np.abs(inequality_multipliers[touchable] * clearance).max(initial=0.0)),
+            sign=float(max(0.0, -inequality_multipliers.min(initial=0.0))),
         )
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Equilibrium(BaseEquilibrium):
-    """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
-
-    Frame: base at the origin, unactuated backbone along +y, cable on the +x side. The lines of points that can touch
-    are those of ``robot.touch``, by default (backbone, cable). The attributes are those of :class:`BaseEquilibrium`.
-    """
-
-    robot_kind: ClassVar[type] = Robot
-
-    robot: Robot
-
-    @property
-    def cable_mm(self) -> float:
-        """Cable displacement l, which differs from the command where it stalled or was blocked [mm]."""
-        return float(self.block[CABLE])
-
-    @property
-    def length_mm(self) -> float:
-        """Length of the backbone L0, which insertion changes [mm]."""
-        return float(self.block[LENGTH])
-
-    @property
-    def tension(self) -> float:
-        """Cable tension dE/dl along the branch [N]."""
-        return float(self.block[TENSION])
-
-    @property
-    def shear(self) -> np.ndarray:
-        """Shear angle ψ of each segment, ``(n,)`` [rad]; zero with a sliding cable."""
-        sines = self._layout.coordinates(self.block)
-        return np.zeros_like(sines) if self.robot.cable == "sliding" else np.asarray(np.arcsin(sines))
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """Backbone point and disk angle of each node, ``(n+1, 3)`` [mm, mm, rad]."""
-        return self._layout.nodes(self.block)
-
-    @property
-    def cable_nodes(self) -> np.ndarray:
-        """Cable point on each disk, ``(n+1, 2)`` [mm]."""
-        return np.asarray(self.nodes[:, :2] + self.robot.offset_mm * self._layout.frames(self.block))
-
-    @property
-    def slack_mm(self) -> float:
-        """How much longer the cable is than its way through the disks [mm]; zero but for a slack, sliding cable."""
-        return self.length_mm - self.cable_mm - float(np.hypot(*np.diff(self.cable_nodes, axis=0).T).sum())
-
-    @property
-    def points(self) -> np.ndarray:
-        """The points that can touch, ``(p, k, 2)`` [mm]."""
-        return touching_points(self.robot, self.nodes)
-
-    @property
-    def pushes(self) -> np.ndarray:
-        """Multipliers of the inequalities of :func:`solver.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
-        multipliers = self.multipliers[:, :, 1:].ravel()
-        if self.robot.cable != "sliding":
-            return multipliers
-        disks = self.disk_multipliers
-        return np.concatenate(
-            [[self.tension / self.stiffness], np.maximum(disks, 0), np.maximum(-disks, 0), multipliers]
-        )
-
-    @property
-    def disk_multipliers(self) -> np.ndarray:
-        """Multiplier of where the disks of each segment meet, negative where it bends away from the cable [rad²/mm].
-
-        ``(n,)`` with a sliding cable, which alone lets segments bend so far; else ``(0,)``.
-        """
-        return self._layout.disk_multipliers(self.block)
-
-    @property
-    def onset_tension(self) -> float:
-        """Cable tension where the present contact began, zero while nothing touches [N]."""
-        return float(self._layout.onset(self.block)[0])
-
-    @property
-    def tip_slopes(self) -> np.ndarray:
-        """Slopes of the free tip pose in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
-        return self._layout.tip_slopes(self.block)
-
-    @property
-    def _layout(self) -> Layout:
-        return layout(self.robot, len(self.scene))
-
-    @property
-    def _derivatives(self) -> ca.Function:
-        return node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
-
-    def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
-        robot, mounts = self.robot, self.displacements[list(self.scene.mounted)]
-        parameters = [self.cable_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
-        unknowns = [self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel(), mounts.ravel()]
-        return np.concatenate(unknowns), np.array(parameters)
 
 
 def _check_block(block: np.ndarray, places: Layout, robot: Any) -> None:

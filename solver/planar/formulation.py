@@ -12,15 +12,26 @@ The first two are turned into C when the package is built (:mod:`solver.codegen`
 """
 
 import itertools
-import math
-from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING
 
 import casadi as ca
 
+from solver.common.gap_laws import (
+    TINY,
+    GapLaw,
+    Symbol,
+    _square_distance,
+    capsule_gap,
+    circle_gap,
+    gaps_of,
+    half_plane_gap,
+    sinc_and_cosine,
+)
+from solver.common.node_problem import NodeProblem, divided, first_derivatives, norms, second_derivatives
+
 if TYPE_CHECKING:  # the build runs this file alone
-    from solver.robot import Robot
+    from solver.planar.robot import Robot
 
 
 def segment_half_sine(sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
@@ -40,16 +51,6 @@ def segment_closure(half_sine: ca.SX, sine: ca.SX, pull: ca.SX, length: ca.SX, o
     return chord * (chord - 2 * length * ca.sqrt(1 - sine**2)) + pull * (2 * length - pull)
 
 
-def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a circle or a sphere ``shape = (center, r)``: ``(|p − c|² − r²) / 2r``."""
-    return (ca.sumsqr(point - shape[:-1]) - shape[-1] ** 2) / (2 * shape[-1])
-
-
-def half_plane_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a half-plane or a half-space ``shape = (n, offset)``, unit outward normal n: ``n·p − offset`` (eq. 12)."""
-    return ca.dot(point, shape[:-1]) - shape[-1]
-
-
 def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
     """Gap to an ellipse ``shape = (x, y, a, b, ux, uy)`` with half-axis a along the unit vector u.
 
@@ -60,14 +61,6 @@ def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
     across = (local[1] * shape[4] - local[0] * shape[5]) / shape[3]
     steepness = ca.sqrt((along / shape[2]) ** 2 + (across / shape[3]) ** 2)
     return (along**2 + across**2 - 1) / (2 * steepness)
-
-
-def capsule_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a capsule ``shape = (start, end, r)``: that of the ball about the nearest point of its axis."""
-    start, axis = shape[: point.numel()], shape[point.numel() : -1] - shape[: point.numel()]
-    fraction = ca.dot(point - start, axis) / ca.sumsqr(axis)
-    nearest = start + ca.fmin(ca.fmax(fraction, 0), 1) * axis
-    return circle_gap(point, ca.vertcat(nearest, shape[-1]))
 
 
 def polygon_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -93,31 +86,6 @@ def polygon_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
     return ca.if_else(ca.logic_and(fraction > 0, fraction < 1), beside, beyond) - shape[0]
 
 
-def _square_distance(point: ca.SX, start: ca.SX, end: ca.SX) -> ca.SX:
-    along = end - start
-    fraction = ca.dot(point - start, along) / ca.fmax(ca.sumsqr(along), TINY)
-    return ca.sumsqr(point - start - ca.fmin(ca.fmax(fraction, 0), 1) * along)
-
-
-class GapLaw(NamedTuple):
-    """One kind of obstacle.
-
-    Attributes:
-        kind: Its name.
-        gap: The gap as a function of (point, shape), with unit slope on the surface.
-        size: How many numbers its shape has.
-        growth: Those of them that grow as much as the obstacle grows outwards.
-        space: Dimension of the points.
-    """
-
-    kind: str
-    gap: Callable[[ca.SX, ca.SX], ca.SX]
-    size: int
-    growth: tuple[int, ...]
-    space: int = 2
-
-
-TINY = 1e-200  # keeps quotients defined where an edge has no length [mm²]
 POLYGON_CORNERS = 8
 CIRCLE = GapLaw("circle", circle_gap, 3, (2,))
 HALF_PLANE = GapLaw("half_plane", half_plane_gap, 3, (2,))
@@ -159,22 +127,6 @@ def segment_function() -> ca.Function:
     )
     law = ca.cse(ca.substitute(law, u, segment_half_sine(sine, pull, length, offset)))
     return ca.Function("ccr_segment", [sine, pull, length, offset], [law])
-
-
-Symbol = TypeVar("Symbol", ca.SX, ca.MX)
-SERIES_TERMS = 12  # of the series below: to the last digit for a quarter turn
-
-
-def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
-    """``sin h / h`` and ``cos h`` in ``square = h²``, smooth at zero, by the power series of the first for |h| ≤ π/2.
-
-    The second is ``d(h sinc h)/dh``, with the slope of the series in ``square``.
-    """
-    sinc = slope = 0 * square
-    for k in reversed(range(SERIES_TERMS)):
-        slope = sinc + square * slope
-        sinc = (-1) ** k / math.factorial(2 * k + 1) + square * sinc
-    return sinc, sinc + 2 * square * slope
 
 
 def arc_function() -> ca.Function:
@@ -222,47 +174,6 @@ def disk_gap_function() -> ca.Function:
     return ca.Function("ccr_disk_gap", [angle, *sizes], [ca.cse(ca.vertcat(gap, slope, ca.gradient(slope, angle)))])
 
 
-@lru_cache(maxsize=64)
-def gap_function(law: GapLaw) -> ca.Function:
-    """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle, and likewise in space."""
-    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
-    gap = law.gap(point, shape)
-    hessian, gradient = ca.hessian(gap, point)
-    upper = [hessian[row, column] for row in range(law.space) for column in range(row, law.space)]
-    outputs = ca.vertcat(gap, gradient, *upper)
-    return ca.Function(f"ccr_{law.kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
-
-
-def clearance_function(law: GapLaw) -> ca.Function:
-    """``(p, shape) → c`` alone, where the slopes are not wanted."""
-    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
-    return ca.Function(f"ccr_{law.kind}_clearance", [point, shape], [ca.cse(law.gap(point, shape))])
-
-
-class NodeProblem(NamedTuple):
-    """Eq. 5 in node coordinates, symbolic.
-
-    Attributes:
-        unknowns: Backbone then cable points of nodes 1…n, then the displacements of the obstacles on springs, each as
-            x, y pairs, ``(4n + 2s,)`` [mm].
-        parameters: ``(l, L0, a, EI)``, the shapes of the obstacles, one after the other, and ``(kxx, kxy, kyy)`` of
-            those on springs.
-        objective: Sum of squared disk angles, and the energy of the springs over ``B = EI / 2 l0`` [rad²].
-        equalities: Zero when every segment has its shape, ``(3n,)`` [mm]. With a uniform cable: lengths of backbone,
-            cable and disk minus their values. With a sliding one, whose segments are arcs: length of the chord minus
-            its value, component of the chord along the bisector of the disks, length of the disk minus its value.
-        inequalities: Not negative, ``(k,)`` [mm]: with a sliding cable its slack, then what is left between the disks
-            of each segment on the cable's side, then on the other; then the gap of every point that can touch, but for
-            node 0, to every obstacle, ordered (obstacle, line, position).
-    """
-
-    unknowns: ca.MX
-    parameters: ca.MX
-    objective: ca.MX
-    equalities: ca.MX
-    inequalities: ca.MX
-
-
 def node_problem(
     robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...], change: ca.MX | None = None
 ) -> NodeProblem:
@@ -284,7 +195,7 @@ def node_problem(
     pull, total, offset = parameters[0], parameters[1], parameters[2]
     if change is not None:
         pull, total = pull + change[0], total + change[1]
-    stiffness = parameters[3] * segments / (2 * total)
+    energy_scale = parameters[3] * segments / (2 * total)
     backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(unknowns[: 2 * segments], 2, segments))
     cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments : 4 * segments], 2, segments))
     disk = cable - backbone
@@ -292,7 +203,7 @@ def node_problem(
     turned = before[0, :] * after[1, :] - before[1, :] * after[0, :]
     angle = ca.atan2(turned, ca.sum1(before * after))
     chords, cables = norms(backbone[:, 1:] - backbone[:, :-1]), norms(cable[:, 1:] - cable[:, :-1])
-    if robot.cable == "sliding":
+    if robot.model == "rod":
         sinc, _ = sinc_and_cosine(angle**2 / 4)
         astride = ca.sum1((backbone[:, 1:] - backbone[:, :-1]) * (before + after)) / (2 * offset)
         equalities = ca.horzcat(chords - total / segments * sinc, astride, norms(after) - offset)
@@ -318,7 +229,7 @@ def node_problem(
         if mounted[j]:
             mount = sum(mounted[:j])
             moved, (xx, xy, yy) = displacements[:, mount], ca.vertsplit(springs[:, mount])
-            energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * stiffness)
+            energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * energy_scale)
             shift = shift + moved
         for line in robot.touch:
             points = divided(lines[line], robot.between)[:, 1:]
@@ -328,7 +239,7 @@ def node_problem(
 
 def limits(robot: "Robot") -> int:
     """How many inequalities a robot's node problem has before the gaps to obstacles."""
-    return 1 + 2 * robot.segments if robot.cable == "sliding" else 0
+    return 1 + 2 * robot.segments if robot.model == "rod" else 0
 
 
 def _disk_gaps(robot: "Robot", backbone: ca.MX, disk: ca.MX, ahead: ca.MX) -> list[ca.MX]:
@@ -349,35 +260,6 @@ def _rotation(angle: ca.MX) -> ca.MX:
     return ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
 
 
-def norms(columns: ca.MX) -> ca.MX:
-    """Lengths of the columns."""
-    return ca.sqrt(ca.sum1(columns**2))
-
-
-def divided(line: ca.MX, between: int) -> ca.MX:
-    """The points of a line with as many between every two."""
-    pieces = [line[:, :-1] + k / (between + 1) * (line[:, 1:] - line[:, :-1]) for k in range(between + 1)]
-    return ca.horzcat(ca.reshape(ca.vertcat(*pieces), line.shape[0], -1), line[:, -1])
-
-
-def gaps_of(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
-    """Gaps of the columns to an obstacle."""
-    count = points.shape[1]
-    return gap_function(law).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
-
-
-def first_derivatives(problem: NodeProblem) -> ca.Function:
-    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of a problem."""
-    outputs = [
-        ca.gradient(problem.objective, problem.unknowns),
-        problem.equalities,
-        ca.jacobian(problem.equalities, problem.unknowns),
-        problem.inequalities,
-        ca.jacobian(problem.inequalities, problem.unknowns),
-    ]
-    return ca.Function("first_derivatives", [problem.unknowns, problem.parameters], outputs).expand()
-
-
 @lru_cache(maxsize=32)
 def node_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """:func:`first_derivatives` of :func:`node_problem`."""
@@ -389,26 +271,3 @@ def kkt_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[boo
     """:func:`second_derivatives` of :func:`node_problem`."""
     change = ca.MX.sym("change", 2 + 4 * len(laws))
     return second_derivatives(node_problem(robot, laws, mounted, change), change)
-
-
-def second_derivatives(problem: NodeProblem, change: ca.MX) -> ca.Function:
-    """Derivatives of the optimality conditions of a problem that was built with a change ``v`` of what it is told.
-
-    With the Lagrangian ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities,
-    inequalities)`` and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the
-    multipliers stands in ``F_v`` already.
-    """
-    _, _, objective, equalities, inequalities = problem
-    tensions, pushes = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("pushes", inequalities.shape[0])
-    lagrangian = objective - ca.dot(tensions, equalities) - ca.dot(pushes, inequalities)
-    loads = ca.gradient(lagrangian, change)
-    conditions = ca.vertcat(ca.gradient(lagrangian, problem.unknowns), equalities, inequalities)
-    outputs = [
-        ca.jacobian(conditions, problem.unknowns),
-        ca.jacobian(conditions, change),
-        loads,
-        ca.jacobian(loads, change),
-    ]
-    outputs = [ca.substitute(output, change, ca.MX.zeros(change.shape)) for output in outputs]
-    inputs = [problem.unknowns, problem.parameters, tensions, pushes]
-    return ca.Function("kkt_derivatives", inputs, outputs).expand()  # to scalars, which are faster to evaluate

@@ -1,18 +1,9 @@
-"""Points of a robot that can touch obstacles."""
+"""Points of a robot that can touch obstacles, and their gaps."""
 
 import numpy as np
 
-from solver.robot import AnyRobot, Robot
-from solver.scene import Scene
-
-
-def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:
-    """The points of ``robot.touch``, ``(lines, positions, 2)`` [mm], of node poses ``(n+1, 3)``.
-
-    Those between two nodes divide the straight line between their points evenly.
-    """
-    disks = np.column_stack([np.cos(nodes[:, 2]), np.sin(nodes[:, 2])])
-    return divided(nodes[:, :2] + np.array(robot.lines_mm)[:, None, None] * disks, robot.between)
+from solver.common.robot import AnyRobot
+from solver.common.scene import Scene
 
 
 def divided(lines: np.ndarray, between: int) -> np.ndarray:

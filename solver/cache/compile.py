@@ -1,4 +1,4 @@
-"""Gap laws compiled at run time, for obstacles whose shape is a CasADi expression."""
+"""CasADi functions compiled at run time, for obstacles whose shape is an expression of the user's own."""
 
 import ctypes
 import functools
@@ -10,8 +10,7 @@ from pathlib import Path
 
 import casadi as ca
 
-from solver.artefacts import ArtefactStore, artefact_key
-from solver.formulation import GapLaw, gap_function
+from solver.cache.artefacts import ArtefactStore, artefact_key
 
 COMPILERS = ["cc", "gcc", "clang", "c++"]
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
@@ -24,19 +23,21 @@ def store() -> ArtefactStore:
 
 
 @functools.cache
-def law_address(law: GapLaw) -> int:
-    """Address of a compiled gap law, ``int law(const double**, double**, int*, double*, int)``, valid for good.
+def function_address(function: ca.Function) -> int:
+    """Return the address of a compiled function, valid for good.
+
+    Its type is that of CasADi's generated code, ``int f(const double**, double**, int*, double*, int)``.
 
     Raises:
         RuntimeError: If there is no C compiler, it fails, or what it makes cannot be loaded.
     """
-    source = _source(gap_function(law))
+    source = _source(function)
     compiler = _compiler()
     version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
     key = artefact_key(source, ca.CasadiMeta.version(), shlex.join(compiler), version, " ".join(FLAGS))
     library = _load(store().path(key, lambda path: _compile(compiler, source, path), ".so"))
     _LIBRARIES.append(library)
-    address = ctypes.cast(getattr(library, f"ccr_{law.kind}_gap"), ctypes.c_void_p).value
+    address = ctypes.cast(getattr(library, function.name()), ctypes.c_void_p).value
     assert address is not None
     return address
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from solver.equilibrium import Equilibrium
-from solver.free import clearance, fitted_slopes, free_tension
-from solver.operations import NUMBERS, Operations
-from solver.robot import Robot
-from solver.validation import LARGEST, array, finite, instance, pair, positive
+from solver.common.operations import NUMBERS, Operations
+from solver.common.validation import LARGEST, array, finite, instance, pair, positive
+from solver.planar.equilibrium import Equilibrium
+from solver.planar.free import clearance, fitted_slopes, free_tension
+from solver.planar.robot import Robot
 
 
 def force_true(equilibrium: Equilibrium) -> np.ndarray:

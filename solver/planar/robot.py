@@ -1,23 +1,18 @@
 """The robot: what the solver needs to know of it, validated once."""
 
 import math
-from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Literal
 
-from solver.validation import SMALLEST, number, positive, sequence, shown, whole
+from solver.common.robot import OFFSETS, check_cable, check_numbers, check_points, check_scale
+from solver.common.validation import number, positive, sequence, shown
 
 LINES = ("backbone", "cable", "rim")
-CABLES = ("uniform", "sliding")
+MODELS = ("paper", "rod")
 ANGLES = 64  # at which the longest edge of a bent segment is looked for
-RIGIDITIES = (1e-60, 1e60)  # that leave EI/L² and EI/2l0, and the squares of forces, normal numbers [N·mm²]
-OFFSETS = (1e-4, 10.0)  # over the longest length: nearer ones leave too few digits of a cable's share
-LEAST_TENSION = 1e-6  # a limit of tension, over EI/(aL): the robot cannot bend below it
-LEAST_CABLE = 1e-6  # the largest displacement, over a
 LEAST_LENGTH = 1e-3  # shortest over longest length
 THICKEST = 0.9  # a disk, over the segment at its shortest
-MAX_POINTS = 2**18  # that can touch: of all lines together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,8 +26,8 @@ class Robot:
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tension, never the shape.
         max_tension: Cable tension the motor can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, half a turn of the tip.
-        cable: ``"uniform"``, the paper's: every segment takes an equal share of the cable displacement and shears.
-            ``"sliding"``: the cable slides through the disks without friction and can go slack, and segments are arcs
+        model: ``"paper"``, the paper's: every segment takes an equal share of the cable displacement and shears.
+            ``"rod"``: the cable slides through the disks without friction and can go slack, and segments are arcs
             (Rao 2024); with more segments this robot tends to the elastica under a tendon of constant tension.
         length_range_mm: Shortest and longest length the base can insert [mm]; ``None`` for a robot of fixed length.
         touch: The lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and
@@ -52,7 +47,7 @@ class Robot:
     rigidity: float = 5000.0
     max_tension: float = 15.0
     max_cable_mm: float | None = None
-    cable: str = "uniform"
+    model: Literal["paper", "rod"] = "paper"
     length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0
@@ -61,8 +56,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         check_numbers(self, LINES)
-        if not (isinstance(self.cable, str) and self.cable in CABLES):
-            raise ValueError(f"cable is {shown(self.cable)}; it must be one of {', '.join(CABLES)}")
+        if not (isinstance(self.model, str) and self.model in MODELS):
+            raise ValueError(f"model is {shown(self.model)}; it must be one of {', '.join(MODELS)}")
         self._check_lengths()
         shortest, longest = self.lengths_mm
         check_scale(self, longest)
@@ -175,7 +170,7 @@ class Robot:
         return _longest_edges(self)
 
     @property
-    def stiffness(self) -> float:
+    def energy_scale(self) -> float:
         """B = EI / 2 l0 [N·mm], which turns the objective J = Σθ² [rad²] into energy."""
         return self.rigidity / (2 * self.segment_mm)
 
@@ -189,7 +184,7 @@ class Robot:
 @lru_cache(maxsize=64)
 def _longest_edges(robot: Robot) -> tuple[float, ...]:
     segment = robot.longest_mm / robot.segments
-    if robot.cable == "sliding":
+    if robot.model == "rod":
         assert robot.disk_radius_mm is not None
         widest = min((segment - robot.disk_thickness_mm) / robot.disk_radius_mm, math.pi)
         angles = [widest * k / ANGLES for k in range(1, ANGLES + 1)]
@@ -198,95 +193,3 @@ def _longest_edges(robot: Robot) -> tuple[float, ...]:
         turned = math.sqrt(segment**2 - (segment - robot.cable_limit_mm / robot.segments) ** 2) / robot.offset_mm
         longest = [segment + max(0.0, -line) * turned for line in robot.lines_mm]
     return tuple(max(segment, length) / (robot.between + 1) for length in longest)
-
-
-class AnyRobot(Protocol):
-    """What robots in the plane and in space have in common."""
-
-    @property
-    def segments(self) -> int:
-        """Number of segments."""
-
-    @property
-    def between(self) -> int:
-        """Number of points of a line between every two nodes."""
-
-    @property
-    def lines_mm(self) -> Sized:
-        """Places on the disk of the lines of points that can touch [mm]."""
-
-    @property
-    def positions(self) -> int:
-        """Number of points of a line that can touch, node 0 included."""
-
-    @property
-    def edges_mm(self) -> Sequence[float]:
-        """Longest distance there can be between neighbouring points of each line [mm]."""
-
-    @property
-    def longest_mm(self) -> float:
-        """Longest length of the backbone [mm]."""
-
-    @property
-    def rigidity(self) -> float:
-        """Flexural rigidity EI of the backbone [N·mm²]."""
-
-
-def check_numbers(robot: Any, lines: tuple[str, ...]) -> None:
-    """Refuse what no robot can have; its numbers become floats and ints, its ``touch`` a tuple, of some of these lines.
-
-    Raises:
-        ValueError: Naming the value and the bound.
-    """
-    assign = object.__setattr__
-    for name in ("length_mm", "offset_mm"):
-        assign(robot, name, positive(name, getattr(robot, name)))
-    assign(robot, "rigidity", positive("rigidity", robot.rigidity, *RIGIDITIES))
-    assign(robot, "segments", whole("segments", robot.segments, 2, 4096))
-    assign(robot, "between", whole("between", robot.between, 0, 256))
-    bound = "positive (math.inf lifts the limit)"
-    assign(robot, "max_tension", number("max_tension", robot.max_tension, SMALLEST, math.inf, bound))
-    wanted = f"a tuple of some of {lines}, each once, as ({lines[0]!r},)"
-    touch = sequence("touch", robot.touch, wanted)
-    named = all(isinstance(line, str) and line in lines for line in touch)
-    if not touch or not named or len(set(touch)) != len(touch):
-        raise ValueError(f"touch is {shown(robot.touch)}; it must be {wanted}")
-    assign(robot, "touch", tuple(touch))
-
-
-def check_scale(robot: Any, longest: float) -> None:
-    """Refuse numbers that are out of all proportion to the robot's longest length.
-
-    Raises:
-        ValueError: Naming the value and the bound.
-    """
-    low, high = (ratio * longest for ratio in OFFSETS)
-    number("offset_mm", robot.offset_mm, low, high, f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length")
-    least = LEAST_TENSION * robot.rigidity / (robot.offset_mm * longest)
-    bound = f"at least {least:.6g}, {LEAST_TENSION} of EI/(a·L), to bend the robot at all (math.inf lifts the limit)"
-    number("max_tension", robot.max_tension, least, math.inf, bound)
-
-
-def check_points(robot: Any, count: int) -> None:
-    """Refuse more points that can touch than there is room for.
-
-    Raises:
-        ValueError: Naming the numbers and the bound.
-    """
-    if count > MAX_POINTS:
-        raise ValueError(
-            f"segments is {robot.segments} and between is {robot.between}; with {len(robot.touch)} kinds of lines in "
-            f"touch these are {count} points that can touch, and at most {MAX_POINTS} are allowed: divide less finely"
-        )
-
-
-def check_cable(robot: Any, default: float) -> None:
-    """Fill in the largest displacement of a cable, and refuse one that is no number or too small to matter.
-
-    Raises:
-        ValueError: Naming the value and the bound.
-    """
-    largest = default if robot.max_cable_mm is None else positive("max_cable_mm", robot.max_cable_mm)
-    least = LEAST_CABLE * robot.offset_mm
-    number("max_cable_mm", largest, least, math.inf, f"at least {least:.6g}, {LEAST_CABLE} of offset_mm")
-    object.__setattr__(robot, "max_cable_mm", largest)

@@ -6,13 +6,14 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from solver.formulation import arc_function
-from solver.geometry import touching_gaps, touching_points
-from solver.layout import PLANE
-from solver.robot import Robot
-from solver.scene import Scene
-from solver.solve import check_scene
-from solver.validation import instance, number, whole
+from solver.common.checks import check_scene
+from solver.common.geometry import touching_gaps
+from solver.common.layout import PLANE
+from solver.common.scene import Scene
+from solver.common.validation import instance, number, whole
+from solver.planar.formulation import arc_function
+from solver.planar.geometry import touching_points
+from solver.planar.robot import Robot
 
 NEWTON_ITERATIONS = 8
 RESOLVED = 1e-9  # of the cable limit: a line over less is fitted to roundoff
@@ -88,7 +89,7 @@ def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
 def free_tension(robot: Robot, cable_mm: float) -> float:
     """Cable tension, ``B dJ/dl`` [N]."""
     segment = _segment(robot, cable_mm)
-    return 2 * robot.stiffness * robot.segments * segment.angle * segment.turn
+    return 2 * robot.energy_scale * robot.segments * segment.angle * segment.turn
 
 
 def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
@@ -117,7 +118,7 @@ def _node(robot: Robot, node: int) -> int:
 def _segment(robot: Robot, cable_mm: float) -> _Segment:
     cable_mm = _cable(robot, cable_mm)
     pull, length, offset = cable_mm / robot.segments, robot.segment_mm, robot.offset_mm
-    if robot.cable == "uniform":  # its shear vanishes
+    if robot.model == "paper":  # its shear vanishes
         turn = 1 / np.sqrt((robot.segments * offset) ** 2 - cable_mm**2 / 4)
         return _Segment(float(2 * np.arcsin(pull / (2 * offset))), length, float(turn), 0.0)
     angle = pull / offset

@@ -13,18 +13,18 @@ from ccr_gym.bodies import Which, plain
 from ccr_gym.checks import require
 from ccr_gym.observation import AHEAD, Observer
 from ccr_gym.reward import TERMS, reward_terms
-from ccr_gym.sensing import Senses
+from ccr_gym.sensing import SensorModel
 from ccr_gym.settings import Settings
 from ccr_gym.tasks import COURSE_STEPS, Assignment, Task, assign, check_robot
-from solver.batch import BaseBatch
-from solver.layout import SPACE, Layout
-from solver.solve import Solver
+from solver import Solver
+from solver.common.batch import BaseBatch
+from solver.common.layout import SPACE, Layout
 from solver.spatial import SpatialSolver
 
 ALL = slice(None)
 
 
-class Reading(NamedTuple):
+class ForceReading(NamedTuple):
     """What one robot feels, or what all of them do.
 
     Attributes:
@@ -46,12 +46,12 @@ class Reading(NamedTuple):
     error: Any
 
 
-class Truth(NamedTuple):
+class PrivilegedState(NamedTuple):
     """What no agent sees of a robot, or of all, for controllers that bound what agents can do and for their teachers.
 
     Attributes:
         force: Contact force on the robot that counts, ``(..., d)`` [N].
-        stiffness: Rigidity over the one that is known.
+        rigidity_ratio: Rigidity over the one that is known.
         goal: Set-point after the next step, a magnitude or ``(..., d)`` [N].
         places: Where the motors have left what they move, ``(..., actions)`` [mm].
         motors: Where the motors are, ``(..., actions)`` [mm].
@@ -59,7 +59,7 @@ class Truth(NamedTuple):
     """
 
     force: np.ndarray
-    stiffness: Any
+    rigidity_ratio: Any
     goal: Any
     places: np.ndarray
     motors: np.ndarray
@@ -73,16 +73,16 @@ class Room(NamedTuple):
         solver: The robots.
         layout: Where the numbers of an equilibrium stand.
         observer: What is seen of it.
-        senses: What is not ideal, if anything is.
+        sensors: What is not ideal, if anything is.
     """
 
     solver: BaseBatch
     layout: Layout
     observer: Observer
-    senses: Senses | None
+    sensors: SensorModel | None
 
 
-class Fleet:
+class EpisodeBatch:
     """Robots, each with a scene and a force to push with.
 
     Args:
@@ -113,19 +113,19 @@ class Fleet:
         """Make room for scenes of so many obstacles."""
         solver = self.body.batch(self._settings, self.count, obstacles, self._threads)
         observer = Observer(self.body, self._settings, solver.layout, self._task)
-        ranges = self._settings.senses
-        senses = Senses(ranges, self.count, self.body, observer.delayed) if ranges else None
-        return Room(solver, solver.layout, observer, senses)
+        ranges = self._settings.sensors
+        sensors = SensorModel(ranges, self.count, self.body, observer.delayed) if ranges else None
+        return Room(solver, solver.layout, observer, sensors)
 
     def _room_for(self, obstacles: int) -> Room:
         """The present room, or another one where the number of obstacles is another."""
         if obstacles == self._layout.obstacles:
-            return Room(self.solver, self._layout, self.observer, self._senses)
+            return Room(self.solver, self._layout, self.observer, self._sensors)
         require(self.count == 1, f"all scenes of several robots must have {self._layout.obstacles} obstacles")
         return self._make_room(obstacles)
 
     def _enter(self, room: Room) -> None:
-        self.solver, self._layout, self.observer, self._senses = room
+        self.solver, self._layout, self.observer, self._sensors = room
 
     def draw(self, robots: Sequence[int], generators: Sequence[np.random.Generator]) -> None:
         """Start new episodes of some robots, each drawn by its own generator.
@@ -170,13 +170,13 @@ class Fleet:
             self.peaks[robots] = _norm(forces)
         self.solver.rest(robots)
         self._effort[robots], self._time[robots] = 0.0, 0
-        if self._courses is None and self._senses is None and not self.body.obstacle_size:
+        if self._courses is None and self._sensors is None and not self.body.obstacle_size:
             return
         for robot, assignment, generator in zip(robots, assignments, generators, strict=True):
             if self._courses is not None:
                 self._courses[robot] = 1.0 if assignment.course is None else assignment.course
-            if self._senses is not None:
-                self._senses.begin(robot, generator, self.solver.blocks[robot, self.body.place])
+            if self._sensors is not None:
+                self._sensors.begin(robot, generator, self.solver.blocks[robot, self.body.place])
             if self.body.obstacle_size:
                 self._seen[robot] = self.body.obstacle(assignment.scene)
 
@@ -188,25 +188,25 @@ class Fleet:
             which: One robot, a list of them, or all.
         """
         body, solver, settings = self.body, self.solver, self._settings
-        if self._senses is None:
+        if self._sensors is None:
             solver.commands[which, body.place] = body.command(solver.blocks, effort, which, settings)
         else:
-            solver.commands[which, body.place] = self._senses.drive(
+            solver.commands[which, body.place] = self._sensors.drive(
                 solver.blocks[which, body.place], effort * body.increments(settings), body.bounds(settings), which
             )
         self._effort[which] = effort
         self._time[which] += 1
         solver.move(which)
 
-    def read(self, which: int | slice = ALL) -> Reading:
+    def read(self, which: int | slice = ALL) -> ForceReading:
         """What one robot or all of them feel now."""
         blocks = self.solver.blocks[which]
         force_true = self._forces(blocks).copy()
         force_est = self.body.estimate(blocks, self._layout, force_true, which, self._settings)
-        if self._senses is not None:
-            stiffness = np.asarray(self._senses.stiffness[which])[..., None]
-            force_true *= stiffness
-            force_est *= stiffness * np.asarray(self._senses.grip[which])[..., None]
+        if self._sensors is not None:
+            rigidity_ratio = np.asarray(self._sensors.rigidity_ratio[which])[..., None]
+            force_true *= rigidity_ratio
+            force_est *= rigidity_ratio * np.asarray(self._sensors.measured_load_fraction[which])[..., None]
         force = plain(_norm(force_true), which)
         desired = plain(self.peaks[which], which) if self._courses is None else self._desired(0, which)
         if self._vector:
@@ -214,7 +214,7 @@ class Fleet:
             error = plain(_norm(goal - force_true), which) / desired
         else:
             goal, error = desired, abs(force - desired) / desired
-        return Reading(blocks, force_true, force_est, force, desired, goal, error)
+        return ForceReading(blocks, force_true, force_est, force, desired, goal, error)
 
     def _desired(self, ahead: int, which: int | slice) -> Any:
         """Magnitude of the set-point some steps ahead [N]."""
@@ -223,27 +223,27 @@ class Fleet:
         robots, time = np.arange(self.count)[which], np.minimum(self._time[which] + ahead, COURSE_STEPS - 1)
         return plain(self.peaks[which] * self._courses[robots, time], which)
 
-    def observe(self, reading: Reading, which: int | slice = ALL) -> np.ndarray:
+    def observe(self, reading: ForceReading, which: int | slice = ALL) -> np.ndarray:
         """What is seen, in the flat form, ``(k,)`` or ``(N, k)`` float32."""
         told = {"desired_force": reading.goal, "force_est": reading.force_est}
         if self._courses is not None:
             told["desired_ahead"] = np.stack([self._desired(steps, which) for steps in AHEAD], axis=-1)
         measured = reading.force_true
-        if self._senses is not None:
-            measured = told["force_measured"] = measured + self._senses.noise(self._time, which)
+        if self._sensors is not None:
+            measured = told["force_measured"] = measured + self._sensors.noise(self._time, which)
         if self._vector:
             told["force_error"] = reading.goal - measured
         else:
             told["force_error"] = reading.goal - (
-                reading.force if self._senses is None else plain(_norm(measured), which)
+                reading.force if self._sensors is None else plain(_norm(measured), which)
             )
         rows = self.observer.rows(reading.blocks, told, self._seen[which])
-        if self._senses is not None:
-            rows = self._senses.late(rows, self._time, which)
-            self.observer.correct(rows, self._senses.motors(which))
+        if self._sensors is not None:
+            rows = self._sensors.late(rows, self._time, which)
+            self.observer.correct(rows, self._sensors.motors(which))
         return self.observer.bounded(rows)
 
-    def rewards(self, reading: Reading, which: int | slice = ALL) -> tuple[Any, ...]:
+    def rewards(self, reading: ForceReading, which: int | slice = ALL) -> tuple[Any, ...]:
         """Terms of the reward of the last step."""
         clearance = plain(reading.blocks[..., self._layout.clearance_at], which)
         effort = self.body.square(plain(self._effort[which], which) if self._effort.ndim == 1 else self._effort[which])
@@ -251,7 +251,7 @@ class Fleet:
         weights, force, desired = self._settings.weights, reading.force, reading.desired
         return reward_terms(weights, force, desired, reading.error, clearance, effort, operations)
 
-    def infos(self, reading: Reading, terms: tuple[Any, ...], which: int | slice = ALL) -> dict[str, Any]:
+    def infos(self, reading: ForceReading, terms: tuple[Any, ...], which: int | slice = ALL) -> dict[str, Any]:
         """What is told beside the observation, a plain number for one robot and an array for many."""
         return {
             "force_true": reading.force_true,
@@ -264,15 +264,17 @@ class Fleet:
             "reward_terms": dict(zip(TERMS, terms, strict=True)),
         }
 
-    def truth(self, which: int | slice = ALL) -> Truth:
+    def privileged_state(self, which: int | slice = ALL) -> PrivilegedState:
         """What is hidden of a robot, or of all."""
-        senses, force = self._senses, self.read(which).force_true
+        sensors, force = self._sensors, self.read(which).force_true
         goal = self._goals[which].copy() if self._vector else self._desired(1, which)
         places = np.reshape(self.solver.blocks[which, self.body.place], (*force.shape[:-1], self.body.actions)).copy()
-        if senses is None:
-            return Truth(force, plain(np.ones(self.count)[which], which), goal, places, places, np.zeros(places.shape))
-        stiffness = plain(senses.stiffness[which], which)
-        return Truth(force, stiffness, goal, places, senses.motors(which), senses.slack(which))
+        if sensors is None:
+            return PrivilegedState(
+                force, plain(np.ones(self.count)[which], which), goal, places, places, np.zeros(places.shape)
+            )
+        rigidity_ratio = plain(sensors.rigidity_ratio[which], which)
+        return PrivilegedState(force, rigidity_ratio, goal, places, sensors.motors(which), sensors.slack(which))
 
     def probe(self, places: np.ndarray) -> np.ndarray:
         """Forces that all robots would feel, ``(N, d)`` [N], if what their motors move were elsewhere.
@@ -284,7 +286,7 @@ class Fleet:
         places = np.clip(places, *self.body.bounds(self._settings))
         commands[:, self.body.place] = places.reshape(commands[:, self.body.place].shape)
         forces = self._forces(self.solver.probe(commands))
-        return forces * (1.0 if self._senses is None else self._senses.stiffness[:, None])
+        return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
 
     def _forces(self, blocks: np.ndarray) -> np.ndarray:
         """Contact forces that count, of a robot of the known rigidity, ``(..., d)`` [N]."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.formulation import GapLaw
-from solver.obstacles import Obstacle
-from solver.validation import shown
+from solver.common.gap_laws import GapLaw
+from solver.common.obstacle import Obstacle
+from solver.common.validation import shown
 
 MAX_OBSTACLES = 32
 
@@ -51,13 +51,13 @@ class Scene:
     @property
     def mounted(self) -> tuple[bool, ...]:
         """Which obstacles are on springs, in order."""
-        return tuple(obstacle.stiffness is not None for obstacle in self.obstacles)
+        return tuple(obstacle.spring is not None for obstacle in self.obstacles)
 
     @property
     def parameters(self) -> tuple[float, ...]:
         """The shapes, one after the other, then (kxx, kxy, kyy) of every obstacle on a spring [N/mm]; in space six."""
         shapes = [value for obstacle in self.obstacles for value in obstacle.parameters]
-        springs = [o.stiffness_matrix[np.triu_indices(o.space)] for o in self.obstacles if o.stiffness]
+        springs = [o.spring_matrix[np.triu_indices(o.space)] for o in self.obstacles if o.spring]
         return (*shapes, *np.ravel(springs).tolist())
 
     @property

@@ -3,22 +3,18 @@
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import lru_cache
 from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
 
-from solver import _kernel
-from solver.equilibrium import BaseEquilibrium, Equilibrium
-from solver.geometry import touching_gaps, touching_points
-from solver.layout import CABLE, PLANE, Layout, Model, layout
-from solver.reference import ReferenceSolver
-from solver.robot import Robot
-from solver.scene import MAX_OBSTACLES, Scene
-from solver.solve import check_clear, check_core, check_scene, kernel_robot, kernel_scene
-from solver.status import Status
-from solver.validation import LARGEST, array, instance, positive, sequence, shown, whole
+from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.equilibrium import BaseEquilibrium
+from solver.common.geometry import touching_gaps
+from solver.common.layout import Layout, Model
+from solver.common.scene import MAX_OBSTACLES, Scene
+from solver.common.status import Status
+from solver.common.validation import LARGEST, array, instance, positive, sequence, shown, whole
 
 MAX_PULL_STEPS = 100_000  # of a trial pull
 
@@ -82,7 +78,7 @@ class BaseBatch(ABC):
         self.factorizations = np.zeros(self.count, np.int64)
         self._scenes: list[Scene | None] = [None] * self.count
         self.commands = np.zeros((self.count, self.model.cables + 1))
-        self._fleet = self._make_fleet(obstacles, threads)
+        self._kernel_batch = self._make_kernel(obstacles, threads)
         self._all = list(range(self.count))
         self._turn = _Turn()
         self._clear: Scene | None = None  # the scene last found to leave the straight robot clear
@@ -99,7 +95,7 @@ class BaseBatch(ABC):
         """The layout of a block."""
 
     @abstractmethod
-    def _make_fleet(self, obstacles: int, threads: int) -> Any:
+    def _make_kernel(self, obstacles: int, threads: int) -> Any:
         """The robots in the kernel."""
 
     @abstractmethod
@@ -139,7 +135,7 @@ class BaseBatch(ABC):
             check_clear(self.robot, scene, self._straight_gaps(scene))
         compiled = self._kernel_scene(scene)
         with self._turn:
-            self._fleet.assign(index, compiled)
+            self._kernel_batch.assign(index, compiled)
             self._scenes[index] = scene
             self._unrested.add(index)
 
@@ -227,7 +223,7 @@ class BaseBatch(ABC):
             self._check_rested(self._all)
             self._check_lengths(self._all)
             blocks, scratch = self.blocks.copy(), [np.zeros(self.count, np.int64) for _ in range(3)]
-            self._fleet.step(self._all, commands, blocks, *scratch)
+            self._kernel_batch.step(self._all, commands, blocks, *scratch)
         return blocks
 
     def optimality(self) -> np.ndarray:
@@ -239,10 +235,10 @@ class BaseBatch(ABC):
         found = np.zeros((self.count, 3))
         with self._turn:
             self._check_rested(self._all)
-            self._fleet.optimality(self.blocks, found)
+            self._kernel_batch.optimality(self.blocks, found)
         return found
 
-    def reaches(
+    def ramp_reaches_force(
         self,
         robots: Sequence[int],
         forces: np.ndarray,
@@ -284,7 +280,7 @@ class BaseBatch(ABC):
         reached = np.zeros((count, self.model.space))
         length = self.robot.length_mm
         with self._turn:
-            found = self._fleet.reaches(which, forces, target, given, increment, limit, length, reached)
+            found = self._kernel_batch.reaches(which, forces, target, given, increment, limit, length, reached)
         return np.array(found, bool), reached
 
     def scene(self, index: int) -> Scene:
@@ -352,7 +348,7 @@ class BaseBatch(ABC):
         return touching_gaps(self.robot, scene, self._straight)
 
     def _move(self, robots: list[int]) -> None:
-        self._fleet.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
+        self._kernel_batch.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
 
 
 def _check_memory(count: int, size: int) -> None:
@@ -367,51 +363,3 @@ def _check_memory(count: int, size: int) -> None:
             f"count is {count}; their blocks need {needed / 1e9:.3g} GB and this machine has {there / 1e9:.3g} GB: "
             f"make batches of at most {there // (8 * size)}"
         )
-
-
-class BatchSolver(BaseBatch):
-    """Many robots in the plane, each moved as :class:`solver.Solver` would; see :class:`BaseBatch`."""
-
-    model = PLANE
-    robot_kind = Robot
-
-    def _straight_points(self) -> np.ndarray:
-        nodes = np.zeros((self.robot.segments + 1, 3))
-        nodes[:, 1] = np.linspace(0.0, self.robot.length_mm, len(nodes))
-        return touching_points(self.robot, nodes)
-
-    def _make_layout(self, obstacles: int) -> Layout:
-        return layout(self.robot, obstacles)
-
-    def _make_fleet(self, obstacles: int, threads: int) -> _kernel.Fleet:
-        return _kernel.Fleet(kernel_robot(self.robot), self.count, obstacles, threads)
-
-    def _kernel_scene(self, scene: Scene) -> _kernel.Scene:
-        return kernel_scene(self.robot, scene)
-
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> Equilibrium:
-        return Equilibrium(self.robot, scene, block, status, *work)
-
-
-class ReferenceBatch(BatchSolver):
-    """The same robots moved by :class:`solver.ReferenceSolver`, one after the other and slowly.
-
-    Trial pulls of :meth:`reaches` are the kernel's.
-    """
-
-    def _move(self, robots: list[int]) -> None:
-        for robot in robots:
-            scene = self._scenes[robot]
-            assert scene is not None
-            reference = _reference(self.robot, scene)
-            if self.commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
-                reached = reference.rest()
-            else:
-                reached = reference.step(self._equilibrium(robot), float(self.commands[robot, CABLE]))
-            self.blocks[robot] = reached.block
-            self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
-
-
-@lru_cache(maxsize=64)
-def _reference(robot: Robot, scene: Scene) -> ReferenceSolver:
-    return ReferenceSolver(robot, scene)

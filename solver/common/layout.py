@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernel import MAX_ACTIVE
-from solver.robot import Robot
 
 CABLE, LENGTH, TENSION, OBJECTIVE = range(4)
 View = Callable[[np.ndarray], np.ndarray]
@@ -87,9 +86,3 @@ class Layout:
 def make_layout(model: Model, segments: int, lines: int, positions: int, obstacles: int) -> Layout:
     """The layout for robots and scenes of these sizes."""
     return Layout(model, segments, lines, positions, obstacles)
-
-
-def layout(robot: Robot, obstacles: int) -> Layout:
-    """The layout for a robot among a number of obstacles."""
-    model = SLIDING if robot.cable == "sliding" else PLANE
-    return make_layout(model, robot.segments, len(robot.touch), robot.positions, obstacles)

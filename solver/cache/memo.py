@@ -1,12 +1,36 @@
 """Steps of the solver that need not be computed twice."""
 
 from collections import OrderedDict
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
-from solver.equilibrium import Equilibrium
-from solver.reference import ReferenceSolver
-from solver.solve import Solver, check_command
-from solver.validation import instance, whole
+import numpy as np
+
+from solver.common.validation import instance, whole
+
+
+class State(Protocol):
+    """An equilibrium, as far as a memo is concerned."""
+
+    @property
+    def block(self) -> np.ndarray:
+        """Its numbers."""
+
+
+StateT = TypeVar("StateT", bound=State)
+
+
+@runtime_checkable
+class Stepper(Protocol[StateT]):
+    """A solver, in the plane or in space."""
+
+    def rest(self) -> StateT:
+        """Return the straight, unactuated robot."""
+
+    def step(self, equilibrium: StateT, *command: Any) -> StateT:
+        """Move from an equilibrium to a command."""
+
+    def check_command(self, equilibrium: StateT, *command: Any) -> tuple[float, ...]:
+        """Return a command as plain numbers; refuse one out of range, or an equilibrium of another solver."""
 
 
 class MemoStatistics(NamedTuple):
@@ -18,7 +42,7 @@ class MemoStatistics(NamedTuple):
     capacity: int
 
 
-class TransitionMemo:
+class TransitionMemo(Generic[StateT]):
     """Stands in for a solver and remembers its latest steps, for work that repeats them: resets, replays, planners.
 
     A step is a function of the state's numbers and the command, and these are the key. Not to be shared by threads.
@@ -32,20 +56,22 @@ class TransitionMemo:
         TypeError: If ``solver`` is something else.
     """
 
-    def __init__(self, solver: Solver | ReferenceSolver, capacity: int = 4096) -> None:
-        instance("solver", solver, (Solver, ReferenceSolver), "a memo stands in for a solver of the plane")
-        self.robot, self.scene, self.rest = solver.robot, solver.scene, solver.rest
-        self._step = solver.step
+    def __init__(self, solver: Stepper[StateT], capacity: int = 4096) -> None:
+        instance("solver", solver, Stepper, "a memo stands in for a solver")
+        self._solver = solver
         self._capacity = whole("capacity", capacity, 1, 2**31)
         self.clear()
 
-    def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
-        """The solver's ``step``, bit for bit.
+    def rest(self) -> StateT:
+        """Return the straight, unactuated robot."""
+        return self._solver.rest()
+
+    def step(self, equilibrium: StateT, *command: Any) -> StateT:
+        """Return what the solver's ``step`` returns, bit for bit.
 
         Args:
             equilibrium: Where the robot is.
-            cable_mm: Commanded cable displacement [mm].
-            length_mm: Commanded length of the backbone [mm]; ``None`` keeps it.
+            command: The other arguments of that ``step``.
 
         Returns:
             The equilibrium reached, the same object while the step is remembered.
@@ -53,14 +79,14 @@ class TransitionMemo:
         Raises:
             ValueError: As the solver; the memo stays as it was.
         """
-        cable_mm, length_mm = check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
-        key = equilibrium.block.tobytes(), cable_mm, length_mm
+        numbers = self._solver.check_command(equilibrium, *command)
+        key = equilibrium.block.tobytes(), numbers
         reached = self._reached.get(key)
         if reached is not None:
             self._reached.move_to_end(key)
             self._hits += 1
             return reached
-        reached = self._reached[key] = self._step(equilibrium, cable_mm, length_mm)
+        reached = self._reached[key] = self._solver.step(equilibrium, *command)
         self._misses += 1
         if len(self._reached) > self._capacity:
             self._reached.popitem(last=False)
@@ -68,7 +94,7 @@ class TransitionMemo:
 
     def clear(self) -> None:
         """Forget all steps and start the statistics anew."""
-        self._reached: OrderedDict[tuple[bytes, float, float], Equilibrium] = OrderedDict()
+        self._reached: OrderedDict[tuple[bytes, tuple[float, ...]], StateT] = OrderedDict()
         self._hits = self._misses = 0
 
     @property

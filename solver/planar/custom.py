@@ -10,9 +10,10 @@ import casadi as ca
 import numpy as np
 
 from solver._kernel import SHAPE_SIZE
-from solver.formulation import GapLaw, gap_function
-from solver.obstacles import SHARPEST, Extent, Obstacle, directions
-from solver.validation import Pair, Point, finite, instance, sequence, shown, unit, whole
+from solver.common.gap_laws import GapLaw, gap_function
+from solver.common.obstacle import SHARPEST, Extent, Obstacle
+from solver.common.validation import Pair, Point, finite, instance, sequence, shown, unit, whole
+from solver.planar.obstacles import directions
 
 UNARY = (
     *("NEG", "EXP", "LOG", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "NOT", "FLOOR", "CEIL"),
@@ -207,7 +208,7 @@ class Custom(Obstacle):
         return np.asarray(self.center + points @ np.array([[x, y], [-y, x]]))
 
     def _radii(self) -> list[tuple[str, float]]:
-        return [("reach", self.reach), ("the sharpest radius", self.extent.fineness)]
+        return [("reach", self.reach), ("the sharpest radius", self.extent.min_curvature_radius)]
 
     def _values(self, points: np.ndarray) -> np.ndarray:
         """The family's function at points from the centre, ``(k, 2) → (k,)``."""

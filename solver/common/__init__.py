@@ -1,0 +1,1 @@
+"""What the solvers in the plane and in space share."""

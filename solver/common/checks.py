@@ -1,0 +1,85 @@
+"""Checks of robots, scenes and equilibria before they are given to the kernel."""
+
+import math
+
+import numpy as np
+
+from solver.common.equilibrium import BaseEquilibrium
+from solver.common.layout import Model
+from solver.common.robot import AnyRobot
+from solver.common.scene import Scene
+from solver.common.validation import instance, shown
+
+SPRINGS = (1e-10, 1e10)  # stiffness of an obstacle's spring, over EI/L³ of the robot
+
+
+def check_core(robot: AnyRobot, scene: Scene) -> None:
+    """Refuse obstacles that could slip through an edge of the robot: those with no point deeper than half an edge.
+
+    Raises:
+        ValueError: Naming the obstacle, its inner radius and what the robot needs.
+    """
+    for obstacle in scene:
+        touchable = obstacle.touchable(robot.segments + 1)
+        inradius, longest = obstacle.extent.inradius, max(robot.edges_mm)
+        if (touchable[1:] & touchable[:-1]).any() and not 2 * inradius > longest:
+            between = math.floor(longest * (robot.between + 1) / (2 * inradius))
+            raise ValueError(
+                f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.3g} mm; it could slip "
+                f"between points of the robot, up to {longest:.3g} mm apart: give the robot between={between} or more"
+            )
+
+
+def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
+    """Refuse obstacles that overlap the straight robot, whose gaps are given, ``(m, p, k)``.
+
+    Raises:
+        ValueError: Naming the obstacle, the node and the depth.
+    """
+    for obstacle, own in zip(scene, gaps, strict=True):
+        if own.min() < 0:
+            node = int(np.unravel_index(own.argmin(), own.shape)[1]) // (robot.between + 1)
+            raise ValueError(f"{shown(obstacle)} overlaps the straight robot by {-own.min():.3g} mm at node {node}")
+
+
+def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None:
+    """Refuse a robot and a scene that a solver has no use for, or that are out of all proportion to each other.
+
+    Raises:
+        TypeError: If they are not of the classes asked for.
+        ValueError: Naming the obstacle, the value and the bound.
+    """
+    instance("robot", robot, kind, "robots of the plane are solver.Robot, those of space solver.spatial.SpatialRobot")
+    instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+    for obstacle in scene:
+        if obstacle.space != model.space:
+            names = ("the plane", "solver.spatial") if model.space == 3 else ("space", "solver")
+            raise ValueError(f"{shown(obstacle)} is an obstacle of {names[0]}; give one of {names[1]}")
+        obstacle.check_proportion(robot.longest_mm)
+        if obstacle.spring is not None:
+            _check_spring(robot, obstacle.spring_matrix)
+
+
+def _check_spring(robot: AnyRobot, spring: np.ndarray) -> None:
+    low, high = (ratio * robot.rigidity / robot.longest_mm**3 for ratio in SPRINGS)
+    least, *_, most = np.linalg.eigvalsh(spring)
+    if not low <= least <= most <= high:
+        raise ValueError(
+            f"spring is from {least:.6g} to {most:.6g} N/mm; it must be from {low:.6g} to {high:.6g} N/mm, "
+            f"{SPRINGS[0]:g} to {SPRINGS[1]:g} of the robot's EI/L³: leave out a softer obstacle, fix a stiffer one"
+        )
+
+
+def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium, kind: type) -> None:
+    """Refuse an equilibrium of another robot or scene.
+
+    Raises:
+        ValueError: Saying which of them differs.
+        TypeError: If it is something else.
+    """
+    if not isinstance(equilibrium, kind):
+        instance("equilibrium", equilibrium, kind, "step from rest() of this solver")
+    if equilibrium.robot is not robot and equilibrium.robot != robot:
+        raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
+    if equilibrium.scene is not scene and equilibrium.scene != scene:
+        raise ValueError("the equilibrium is of another scene; step from rest() of this solver")

@@ -1,0 +1,90 @@
+"""Gap laws that the plane and space share: the signed clearance of a point from an obstacle, in CasADi."""
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple, TypeVar
+
+import casadi as ca
+
+
+def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to a circle or a sphere ``shape = (center, r)``: ``(|p − c|² − r²) / 2r``."""
+    return (ca.sumsqr(point - shape[:-1]) - shape[-1] ** 2) / (2 * shape[-1])
+
+
+def half_plane_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to a half-plane or a half-space ``shape = (n, offset)``, unit outward normal n: ``n·p − offset`` (eq. 12)."""
+    return ca.dot(point, shape[:-1]) - shape[-1]
+
+
+def capsule_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
+    """Gap to a capsule ``shape = (start, end, r)``: that of the ball about the nearest point of its axis."""
+    start, axis = shape[: point.numel()], shape[point.numel() : -1] - shape[: point.numel()]
+    fraction = ca.dot(point - start, axis) / ca.sumsqr(axis)
+    nearest = start + ca.fmin(ca.fmax(fraction, 0), 1) * axis
+    return circle_gap(point, ca.vertcat(nearest, shape[-1]))
+
+
+def _square_distance(point: ca.SX, start: ca.SX, end: ca.SX) -> ca.SX:
+    along = end - start
+    fraction = ca.dot(point - start, along) / ca.fmax(ca.sumsqr(along), TINY)
+    return ca.sumsqr(point - start - ca.fmin(ca.fmax(fraction, 0), 1) * along)
+
+
+class GapLaw(NamedTuple):
+    """One kind of obstacle.
+
+    Attributes:
+        kind: Its name.
+        gap: The gap as a function of (point, shape), with unit slope on the surface.
+        size: How many numbers its shape has.
+        growth: Those of them that grow as much as the obstacle grows outwards.
+        space: Dimension of the points.
+    """
+
+    kind: str
+    gap: Callable[[ca.SX, ca.SX], ca.SX]
+    size: int
+    growth: tuple[int, ...]
+    space: int = 2
+
+
+TINY = 1e-200  # keeps quotients defined where an edge has no length [mm²]
+Symbol = TypeVar("Symbol", ca.SX, ca.MX)
+SERIES_TERMS = 12  # of the series below: to the last digit for a quarter turn
+
+
+def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
+    """``sin h / h`` and ``cos h`` in ``square = h²``, smooth at zero, by the power series of the first for |h| ≤ π/2.
+
+    The second is ``d(h sinc h)/dh``, with the slope of the series in ``square``.
+    """
+    sinc = slope = 0 * square
+    for k in reversed(range(SERIES_TERMS)):
+        slope = sinc + square * slope
+        sinc = (-1) ** k / math.factorial(2 * k + 1) + square * sinc
+    return sinc, sinc + 2 * square * slope
+
+
+@lru_cache(maxsize=64)
+def gap_function(law: GapLaw) -> ca.Function:
+    """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle, and likewise in space."""
+    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
+    gap = law.gap(point, shape)
+    hessian, gradient = ca.hessian(gap, point)
+    upper = [hessian[row, column] for row in range(law.space) for column in range(row, law.space)]
+    outputs = ca.vertcat(gap, gradient, *upper)
+    return ca.Function(f"ccr_{law.kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
+
+
+def clearance_function(law: GapLaw) -> ca.Function:
+    """``(p, shape) → c`` alone, where the slopes are not wanted."""
+    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
+    return ca.Function(f"ccr_{law.kind}_clearance", [point, shape], [ca.cse(law.gap(point, shape))])
+
+
+def gaps_of(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
+    """Gaps of the columns to an obstacle."""
+    count = points.shape[1]
+    return gap_function(law).map(count)(points, ca.repmat(shape, 1, count))[0, :].T

@@ -1,0 +1,35 @@
+"""Steps and options of the reference solvers, which hand the node-coordinate problem to IPOPT."""
+
+from typing import Any
+
+# Displacements of the cable are over its offset a, places over the length L of the robot at its longest.
+LARGEST_STEP, SMALLEST_STEP = 0.03125, 0.00375  # of one solve, and of its last try [a]
+INSERTION = 11.25  # displacement that counts as much as an insertion by L [a]
+PRETENSION = 0.00625  # a touching robot is not slackened below it [a]
+SLACK = 1.25e-4  # below it a shear costs too little for IPOPT, and the robot is taken as free [a]
+TURN = 0.02  # unit of the angles of a robot with a sliding cable [rad]
+RESOLUTION = 1.25e-7  # to which the command at the tension limit is found [a]
+MOVE_OFFSET, MOVE_SLOPE = 0.0028, 0.71  # a node that moves farther than offset + slope·|step| has left the branch [L]
+
+OPTIONS: dict[str, Any] = {
+    "print_time": False,
+    "ipopt": {
+        "print_level": 0,
+        "sb": "yes",
+        "max_iter": 500,
+        "tol": 1e-11,
+        "dual_inf_tol": 1e-10,
+        "constr_viol_tol": 1e-11,
+        "compl_inf_tol": 1e-11,
+        "acceptable_iter": 0,
+        "bound_relax_factor": 0.0,
+        "nlp_scaling_method": "none",
+        "mu_init": 1e-9,
+        "warm_start_init_point": "yes",
+        "warm_start_bound_push": 1e-9,
+        "warm_start_bound_frac": 1e-9,
+        "warm_start_slack_bound_push": 1e-9,
+        "warm_start_slack_bound_frac": 1e-9,
+        "warm_start_mult_bound_push": 1e-9,
+    },
+}

@@ -1,0 +1,65 @@
+"""Many robots in the plane, moved by one call."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from solver import _kernel
+from solver.common.batch import BaseBatch
+from solver.common.layout import CABLE, PLANE, Layout
+from solver.common.scene import Scene
+from solver.common.status import Status
+from solver.planar.equilibrium import Equilibrium
+from solver.planar.geometry import touching_points
+from solver.planar.layout import layout
+from solver.planar.reference import ReferenceSolver
+from solver.planar.robot import Robot
+from solver.planar.solve import kernel_robot, kernel_scene
+
+
+class BatchSolver(BaseBatch):
+    """Many robots in the plane, each moved as :class:`solver.Solver` would; see :class:`BaseBatch`."""
+
+    model = PLANE
+    robot_kind = Robot
+
+    def _straight_points(self) -> np.ndarray:
+        nodes = np.zeros((self.robot.segments + 1, 3))
+        nodes[:, 1] = np.linspace(0.0, self.robot.length_mm, len(nodes))
+        return touching_points(self.robot, nodes)
+
+    def _make_layout(self, obstacles: int) -> Layout:
+        return layout(self.robot, obstacles)
+
+    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.Fleet:
+        return _kernel.Fleet(kernel_robot(self.robot), self.count, obstacles, threads)
+
+    def _kernel_scene(self, scene: Scene) -> _kernel.Scene:
+        return kernel_scene(self.robot, scene)
+
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> Equilibrium:
+        return Equilibrium(self.robot, scene, block, status, *work)
+
+
+class ReferenceBatch(BatchSolver):
+    """The same robots moved by :class:`solver.ReferenceSolver`, one after the other and slowly.
+
+    Trial pulls of :meth:`ramp_reaches_force` are the kernel's.
+    """
+
+    def _move(self, robots: list[int]) -> None:
+        for robot in robots:
+            scene = self._scenes[robot]
+            assert scene is not None
+            reference = _reference(self.robot, scene)
+            if self.commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
+                reached = reference.rest()
+            else:
+                reached = reference.step(self._equilibrium(robot), float(self.commands[robot, CABLE]))
+            self.blocks[robot] = reached.block
+            self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
+
+
+@lru_cache(maxsize=64)
+def _reference(robot: Robot, scene: Scene) -> ReferenceSolver:
+    return ReferenceSolver(robot, scene)

@@ -1,0 +1,111 @@
+"""The result of a solve: one equilibrium of the robot, immutable and complete."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+import numpy as np
+
+from solver.common.equilibrium import BaseEquilibrium
+from solver.common.layout import CABLE, LENGTH, TENSION, Layout
+from solver.planar.formulation import node_derivatives
+from solver.planar.geometry import touching_points
+from solver.planar.layout import layout
+from solver.planar.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Equilibrium(BaseEquilibrium):
+    """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
+
+    Frame: base at the origin, unactuated backbone along +y, cable on the +x side. The lines of points that can touch
+    are those of ``robot.touch``, by default (backbone, cable). The attributes are those of :class:`BaseEquilibrium`.
+    """
+
+    robot_kind: ClassVar[type] = Robot
+
+    robot: Robot
+
+    @property
+    def cable_mm(self) -> float:
+        """Cable displacement l, which differs from the command where it stalled or was blocked [mm]."""
+        return float(self.block[CABLE])
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the backbone L0, which insertion changes [mm]."""
+        return float(self.block[LENGTH])
+
+    @property
+    def tension(self) -> float:
+        """Cable tension dE/dl along the branch [N]."""
+        return float(self.block[TENSION])
+
+    @property
+    def shear(self) -> np.ndarray:
+        """Shear angle ψ of each segment, ``(n,)`` [rad]; zero with a sliding cable."""
+        sines = self._layout.coordinates(self.block)
+        return np.zeros_like(sines) if self.robot.model == "rod" else np.asarray(np.arcsin(sines))
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Backbone point and disk angle of each node, ``(n+1, 3)`` [mm, mm, rad]."""
+        return self._layout.nodes(self.block)
+
+    @property
+    def cable_nodes(self) -> np.ndarray:
+        """Cable point on each disk, ``(n+1, 2)`` [mm]."""
+        return np.asarray(self.nodes[:, :2] + self.robot.offset_mm * self._layout.frames(self.block))
+
+    @property
+    def slack_mm(self) -> float:
+        """How much longer the cable is than its way through the disks [mm]; zero but for a slack, sliding cable."""
+        return self.length_mm - self.cable_mm - float(np.hypot(*np.diff(self.cable_nodes, axis=0).T).sum())
+
+    @property
+    def points(self) -> np.ndarray:
+        """The points that can touch, ``(p, k, 2)`` [mm]."""
+        return touching_points(self.robot, self.nodes)
+
+    @property
+    def inequality_multipliers(self) -> np.ndarray:
+        """Multipliers of the inequalities of :func:`solver.planar.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
+        multipliers = self.multipliers[:, :, 1:].ravel()
+        if self.robot.model != "rod":
+            return multipliers
+        disks = self.disk_multipliers
+        return np.concatenate(
+            [[self.tension / self.energy_scale], np.maximum(disks, 0), np.maximum(-disks, 0), multipliers]
+        )
+
+    @property
+    def disk_multipliers(self) -> np.ndarray:
+        """Multiplier of where the disks of each segment meet, negative where it bends away from the cable [rad²/mm].
+
+        ``(n,)`` with a sliding cable, which alone lets segments bend so far; else ``(0,)``.
+        """
+        return self._layout.disk_multipliers(self.block)
+
+    @property
+    def onset_tension(self) -> float:
+        """Cable tension where the present contact began, zero while nothing touches [N]."""
+        return float(self._layout.onset(self.block)[0])
+
+    @property
+    def tip_slopes(self) -> np.ndarray:
+        """Slopes of the free tip pose in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm]."""
+        return self._layout.tip_slopes(self.block)
+
+    @property
+    def _layout(self) -> Layout:
+        return layout(self.robot, len(self.scene))
+
+    @property
+    def _derivatives(self) -> ca.Function:
+        return node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
+
+    def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
+        robot, mounts = self.robot, self.displacements[list(self.scene.mounted)]
+        parameters = [self.cable_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
+        unknowns = [self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel(), mounts.ravel()]
+        return np.concatenate(unknowns), np.array(parameters)

@@ -1,0 +1,150 @@
+"""The solver: one robot in one scene, its equilibria followed step by step."""
+
+import numpy as np
+
+from solver import _kernel
+from solver.common.checks import check_clear, check_core, check_origin, check_scene
+from solver.common.equilibrium import Optimality
+from solver.common.kernel_input import scene_arrays
+from solver.common.layout import LENGTH, PLANE
+from solver.common.scene import Scene
+from solver.common.trace import Trace, read_trace
+from solver.common.validation import number
+from solver.planar.equilibrium import Equilibrium
+from solver.planar.robot import Robot
+
+
+class Solver:
+    """Follows the equilibria of a robot among obstacles as its cable is pulled and released (eq. 5).
+
+    The equilibrium reached depends on the way there, so the present one is an argument of every step and the solver
+    keeps none.
+
+    Args:
+        robot: The robot.
+        scene: The obstacles.
+
+    Raises:
+        ValueError: If an obstacle is one of space, overlaps the straight robot, is small enough to slip between its
+            points, names a node the robot does not have, or is out of all proportion to it.
+        TypeError: If the robot or the scene is something else.
+        RuntimeError: If a :class:`~solver.planar.custom.Custom` shape cannot be compiled.
+    """
+
+    def __init__(self, robot: Robot, scene: Scene) -> None:
+        check_scene(robot, Robot, scene, PLANE)
+        self.robot = robot
+        self.scene = scene
+        check_core(robot, scene)
+        self._kernel = _kernel.Kernel(kernel_robot(robot), kernel_scene(robot, scene))
+        straight = np.zeros(self._kernel.block_size)
+        straight[LENGTH] = robot.length_mm
+        self._rest = self._follow(straight, 0.0, robot.length_mm)
+        check_clear(robot, scene, self._rest.gaps)
+
+    def rest(self) -> Equilibrium:
+        """The straight, unactuated robot."""
+        return self._rest
+
+    def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
+        """Move the cable to a displacement, and the base to an insertion, as far as tension and obstacles allow.
+
+        Args:
+            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
+            cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
+            length_mm: Commanded length of the backbone, within ``robot.length_range_mm`` [mm]; ``None`` keeps it. Both
+                commands are approached evenly.
+
+        Returns:
+            The equilibrium reached; its ``status`` says how. While anything touches, a uniform cable is not slackened
+            below a pretension of 0.00625 of ``robot.offset_mm``, where the shape would be undetermined; without it such
+            a robot is given up on where insertion meets an obstacle.
+
+        Raises:
+            ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is something else.
+        """
+        cable_mm, length_mm = self.check_command(equilibrium, cable_mm, length_mm)
+        return self._follow(equilibrium.block, cable_mm, length_mm)
+
+    def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Trace:
+        """Every shape accepted on the way of :meth:`step`, from the present one on.
+
+        Shows what happens inside a step: its sub-steps, and the descent through a snap.
+
+        Raises:
+            ValueError: As :meth:`step`.
+        """
+        cable_mm, length_mm = self.check_command(equilibrium, cable_mm, length_mm)
+        return read_trace(self._kernel.trace(equilibrium.block, (cable_mm, length_mm)), self.robot, self.scene, 2)
+
+    def optimality(self, equilibrium: Equilibrium) -> Optimality:
+        """How well an equilibrium meets its conditions, computed anew by the kernel.
+
+        Raises:
+            ValueError: If the equilibrium is another robot's or scene's.
+        """
+        check_origin(self.robot, self.scene, equilibrium, Equilibrium)
+        return Optimality(*self._kernel.optimality(equilibrium.block))
+
+    def check_command(
+        self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
+    ) -> tuple[float, float]:
+        """Return a command as floats, the present length where none is given.
+
+        Raises:
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is something else.
+        """
+        return check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
+
+    def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
+        reached = np.empty_like(block)
+        work = self._kernel.step(block, cable_mm, length_mm, reached)
+        return Equilibrium.solved(self.robot, self.scene, reached, *work)
+
+
+def kernel_robot(robot: Robot) -> _kernel.Robot:
+    """A robot as the kernel takes it."""
+    return _kernel.Robot(
+        sliding=robot.model == "rod",
+        segments=robot.segments,
+        offset=robot.offset_mm,
+        angle=0.0,
+        rigidity=robot.rigidity,
+        max_tension=robot.max_tension,
+        max_length=robot.lengths_mm[1],
+        disk_radius=robot.disk_radius_mm or robot.offset_mm,
+        disk_thickness=robot.disk_thickness_mm,
+        lines=[(line, 0.0) for line in robot.lines_mm],
+        edges=list(robot.edges_mm),
+        between=robot.between,
+    )
+
+
+def kernel_scene(robot: Robot, scene: Scene) -> _kernel.Scene:
+    """Obstacles as the kernel takes them.
+
+    Raises:
+        ValueError: If an obstacle names a node that the robot does not have.
+        RuntimeError: If a custom shape cannot be compiled.
+    """
+    return _kernel.Scene(*scene_arrays(robot, scene))
+
+
+def check_command(
+    robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None
+) -> tuple[float, float]:
+    """Refuse a command out of range and an equilibrium of another robot or scene; returns the command as floats.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+        TypeError: If the equilibrium is something else.
+    """
+    limit = robot.cable_limit_mm
+    if not (type(cable_mm) is float and 0 < cable_mm <= limit):
+        cable_mm = number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+    check_origin(robot, scene, equilibrium, Equilibrium)
+    if length_mm is None:
+        return cable_mm, equilibrium.length_mm
+    return cable_mm, robot.check_length(length_mm)
