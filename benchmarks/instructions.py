@@ -52,7 +52,7 @@ def write(steps: Steps, path: Path) -> None:
     for solver, group in groups:
         parts.append(len(solver.scene))
         for obstacle in solver.scene:
-            parts += [SHAPES[obstacle.kind], len(obstacle.parameters), obstacle.parameters]
+            parts += [SHAPES[obstacle.kind].value, len(obstacle.parameters), obstacle.parameters]
         parts.append(len(group))
         for step in group:
             parts += [step.command, step.start.length_mm, step.start.block]

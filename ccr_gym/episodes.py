@@ -245,7 +245,7 @@ class EpisodeBatch:
 
     def rewards(self, reading: ForceReading, which: int | slice = ALL) -> tuple[Any, ...]:
         """Terms of the reward of the last step."""
-        clearance = plain(reading.blocks[..., self._layout.clearance_at], which)
+        clearance = plain(reading.blocks[..., self._layout.clearance.at], which)
         effort = self.body.square(plain(self._effort[which], which) if self._effort.ndim == 1 else self._effort[which])
         operations = self.body.operations(which)
         weights, force, desired = self._settings.weights, reading.force, reading.desired

@@ -99,7 +99,7 @@ class BaseBatch(ABC):
         """The robots in the kernel."""
 
     @abstractmethod
-    def _kernel_scene(self, scene: Scene) -> Any:
+    def _kernel_obstacles(self, scene: Scene) -> Any:
         """Obstacles as the kernel takes them."""
 
     @abstractmethod
@@ -133,9 +133,9 @@ class BaseBatch(ABC):
         check_core(self.robot, scene)
         if scene is not self._clear:
             check_clear(self.robot, scene, self._straight_gaps(scene))
-        compiled = self._kernel_scene(scene)
+        compiled = self._kernel_obstacles(scene)
         with self._turn:
-            self._kernel_batch.assign(index, compiled)
+            self._kernel_batch.set_obstacles(index, compiled)
             self._scenes[index] = scene
             self._unrested.add(index)
 
@@ -163,7 +163,7 @@ class BaseBatch(ABC):
         with self._turn:
             self._unrested.update(which)
             self.blocks[which] = 0.0
-            self.blocks[which, self.layout.length_at] = self.robot.length_mm
+            self.blocks[which, self.layout.length.at] = self.robot.length_mm
             self.commands[which] = 0.0
             self.commands[which, -1] = self.robot.length_mm
             self._move(which)
@@ -280,7 +280,9 @@ class BaseBatch(ABC):
         reached = np.zeros((count, self.model.space))
         length = self.robot.length_mm
         with self._turn:
-            found = self._kernel_batch.reaches(which, forces, target, given, increment, limit, length, reached)
+            found = self._kernel_batch.ramps_reach_forces(
+                which, forces, target, given, increment, limit, length, reached
+            )
         return np.array(found, bool), reached
 
     def scene(self, index: int) -> Scene:
@@ -334,7 +336,7 @@ class BaseBatch(ABC):
 
     def _check_lengths(self, robots: list[int]) -> None:
         """Refuse blocks that someone has written another length into, or what is none."""
-        lengths = self.blocks[:, self.layout.length_at]
+        lengths = self.blocks[:, self.layout.length.at]
         lengths = lengths if robots is self._all else lengths[robots]
         low, high = self._low[-1], self._high[-1]
         if lengths.size and not (low <= lengths.min() and lengths.max() <= high):

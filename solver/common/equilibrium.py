@@ -116,12 +116,12 @@ class BaseEquilibrium(ABC):
     @property
     def length_mm(self) -> float:
         """Length of the backbone L0, which insertion changes [mm]."""
-        return float(self.block[self._layout.length_at])
+        return float(self.block[self._layout.length.at])
 
     @property
     def objective(self) -> float:
         """Sum of squared disk angles J [rad²]."""
-        return float(self.block[self._layout.objective_at])
+        return float(self.block[self._layout.objective.at])
 
     @property
     def energy(self) -> float:

@@ -1,36 +1,55 @@
 """Obstacles as the kernel takes them."""
 
+from typing import TypedDict
+
 import numpy as np
 
-from solver._kernel import SHAPE_SIZE
+from solver import _kernel
 from solver.cache.compile import function_address
-from solver.common.gap_laws import gap_function
+from solver.common.gap_laws import GapLaw, gap_function
 from solver.common.geometry import touchable_points
-from solver.common.obstacle import SHAPES
+from solver.common.obstacle import SHAPES, Obstacle
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
 
-SceneArrays = tuple[list[int], np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[int], list[np.ndarray]]
+
+class KernelObstacle(TypedDict):
+    """The keyword arguments of ``_kernel.Obstacle`` and ``_kernel.SpatialObstacle``."""
+
+    shape: _kernel.Shape
+    parameters: np.ndarray
+    center: tuple[float, ...]
+    radius: float
+    min_curvature_radius: float
+    inradius: float
+    outline: np.ndarray
+    touchable: np.ndarray
+    spring: np.ndarray
+    law: int
 
 
-def scene_arrays(robot: AnyRobot, scene: Scene) -> SceneArrays:
-    """What the kernel wants to know of obstacles.
+def kernel_obstacles(robot: AnyRobot, scene: Scene) -> list[KernelObstacle]:
+    """Return what the kernel needs to know of each obstacle.
 
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
         RuntimeError: If a custom shape cannot be compiled.
     """
-    extents = [obstacle.extent for obstacle in scene]
-    return (
-        [SHAPES[obstacle.kind] for obstacle in scene],
-        np.array([_filled(obstacle.parameters, SHAPE_SIZE) for obstacle in scene], dtype=float),
-        np.array([(*e.center, e.radius, e.min_curvature_radius, e.inradius) for e in extents], dtype=float),
-        touchable_points(robot, scene).reshape(len(scene), len(robot.lines_mm) * robot.positions),
-        np.array([obstacle.spring_matrix for obstacle in scene], dtype=float),
-        [function_address(gap_function(law)) if law.kind == "custom" else 0 for law in scene.laws],
-        [np.ascontiguousarray(obstacle.surface) for obstacle in scene],
+    parts = zip(scene, scene.laws, touchable_points(robot, scene), strict=True)
+    return [_kernel_obstacle(obstacle, law, touchable) for obstacle, law, touchable in parts]
+
+
+def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> KernelObstacle:
+    extent = obstacle.extent
+    return KernelObstacle(
+        shape=SHAPES[obstacle.kind],
+        parameters=np.array(obstacle.parameters, dtype=float),
+        center=extent.center,
+        radius=extent.radius,
+        min_curvature_radius=extent.min_curvature_radius,
+        inradius=extent.inradius,
+        outline=np.ascontiguousarray(obstacle.surface),
+        touchable=touchable,
+        spring=obstacle.spring_matrix.astype(float),
+        law=function_address(gap_function(law)) if law.kind == "custom" else 0,
     )
-
-
-def _filled(values: tuple[float, ...], size: int) -> tuple[float, ...]:
-    return values + (size - len(values)) * (0.0,)

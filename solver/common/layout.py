@@ -1,44 +1,54 @@
-"""Where the numbers of an equilibrium stand in its block, one block ``(size,)`` or many ``(N, size)``."""
+"""Memory layout of an equilibrium block, one block ``(size,)`` or many ``(N, size)``."""
 
-from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from solver._kernel import MAX_ACTIVE
-
-CABLE, LENGTH, TENSION, OBJECTIVE = range(4)
-View = Callable[[np.ndarray], np.ndarray]
+from solver import _kernel
 
 
 class Model(NamedTuple):
     """How many numbers describe a robot.
 
     Attributes:
-        space: Of a place.
-        controls: Of the shape of a segment.
-        cables: Cables.
-        frame: Of the directions on a disk, an array of this shape.
-        tip: Slopes of the free tip, an array of this shape.
-        disks: Whether the disks of a segment can meet.
+        kind: What the kernel computes of a segment.
+        space: Dimensions of a point.
+        cables: Cables, in space pairs of them.
     """
 
+    kind: _kernel.Model
     space: int
-    controls: int
     cables: int
-    frame: tuple[int, ...]
-    tip: tuple[int, ...]
-    disks: bool = False
 
 
-PLANE = Model(space=2, controls=1, cables=1, frame=(2,), tip=(3,))
-SLIDING = PLANE._replace(disks=True)
-SPACE = Model(space=3, controls=3, cables=2, frame=(3, 3), tip=(2, 5))
+PLANE = Model(_kernel.Model.PAPER, space=2, cables=1)
+ROD = PLANE._replace(kind=_kernel.Model.ROD)
+SPACE = Model(_kernel.Model.SPATIAL, space=3, cables=2)
+
+
+class Field:
+    """A field of the block. Calling it returns its view of a block, or of the rows of an array of blocks.
+
+    Attributes:
+        at: Index of its first number.
+        shape: Shape of the view of one block.
+    """
+
+    __slots__ = ("_stop", "at", "shape")
+
+    def __init__(self, field: _kernel.BlockField) -> None:
+        self.at, self._stop = field.offset, field.offset + field.size
+        self.shape: tuple[int, ...] = field.shape
+
+    def __call__(self, block: np.ndarray) -> np.ndarray:
+        """Return the view, ``(..., *shape)``."""
+        view = block[..., self.at : self._stop]
+        return view if len(self.shape) == 1 else view.reshape(*block.shape[:-1], *self.shape)
 
 
 class Layout:
-    """Views of a block, or of the rows of an array of blocks; every attribute is a function of it.
+    """The fields of a block, in the order that the kernel states (``solver/native/solve/block_layout.hpp``).
 
     Args:
         model: The model of the robot.
@@ -46,43 +56,45 @@ class Layout:
         lines: Lines of points that can touch.
         positions: Points of a line.
         obstacles: Obstacles of the scene.
+
+    Attributes:
+        size: Numbers in a block.
     """
 
+    cables: Field
+    length: Field
+    tensions: Field
+    objective: Field
+    coordinates: Field
+    nodes: Field
+    frames: Field
+    multipliers: Field
+    gaps: Field
+    displacements: Field
+    forces: Field
+    force: Field
+    clearance: Field
+    onset: Field
+    tip_slopes: Field
+    flags: Field
+    disk_multipliers: Field
+    trend_coordinates: Field
+    trend_displacements: Field
+    trend_multipliers: Field
+
     def __init__(self, model: Model, segments: int, lines: int, positions: int, obstacles: int) -> None:
-        n, space, contacts = segments, model.space, (obstacles, lines, positions)
         self.obstacles = obstacles
         self.size = 0
-        self.cables = self._view(model.cables)
-        self.length_at = self.size
-        self.length = self._view(1)
-        self.tensions = self._view(model.cables)
-        self.objective_at = self.size
-        self.objective = self._view(1)
-        self.coordinates = self._view(n) if model.controls == 1 else self._view(n, model.controls)
-        self.nodes = self._view(n + 1, 3)
-        self.frames = self._view(n + 1, *model.frame)
-        self.multipliers = self._view(*contacts)
-        self.gaps = self._view(*contacts)
-        self.displacements = self._view(obstacles, space)
-        self.forces = self._view(obstacles, space)
-        self.force = self._view(space)
-        self.clearance_at = self.size
-        self.clearance = self._view(1)
-        self.onset = self._view(model.cables)
-        self.tip_slopes = self._view(*model.tip)
-        self.flags = self._view(lines * positions)
-        self.disk_multipliers = self._view(n if model.disks else 0)
-        self.trend = self._view(n * model.controls + space * obstacles + MAX_ACTIVE if model.cables == 1 else 0)
+        for field in _kernel.block_layout(model.kind, segments, lines, positions, obstacles):
+            setattr(self, field.name, Field(field))
+            self.size = field.offset + field.size
 
-    def _view(self, *shape: int) -> View:
-        start = self.size
-        self.size = end = start + int(np.prod(shape))
-        if len(shape) == 1:
-            return lambda block: block[..., start:end]
-        return lambda block: block[..., start:end].reshape(*block.shape[:-1], *shape)
+
+# TODO: go when ccr_gym/bodies.py takes the fields of its layout.
+CABLE, LENGTH, TENSION = (getattr(Layout(PLANE, 1, 1, 1, 0), name).at for name in ("cables", "length", "tensions"))
 
 
 @lru_cache(maxsize=128)
 def make_layout(model: Model, segments: int, lines: int, positions: int, obstacles: int) -> Layout:
-    """The layout for robots and scenes of these sizes."""
+    """Return the layout for robots and scenes of these sizes."""
     return Layout(model, segments, lines, positions, obstacles)

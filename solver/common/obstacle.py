@@ -12,7 +12,7 @@ from solver import _kernel
 from solver.common.gap_laws import GapLaw
 from solver.common.validation import Matrix, Point, check_points, point, positive, sequence, shown, spring, whole
 
-SHAPES = {kind: index for index, kind in enumerate(_kernel.SHAPES.split())}
+SHAPES = {shape.name.lower(): shape for shape in _kernel.Shape}
 FARTHEST = 100.0  # place or size of an obstacle, over the robot's longest length
 MAX_NODES = 4097  # of a robot
 SHARPEST = 1e-9  # smallest radius of an obstacle's surface, over that length

@@ -5,10 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver import _kernel
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
-
-REASONS = ("", "folded", "work", "stuck")
 
 
 class Trace(NamedTuple):
@@ -29,7 +28,7 @@ class Trace(NamedTuple):
     reason: str
 
 
-def read_trace(traced: tuple[list[float], int], robot: AnyRobot, scene: Scene, space: int) -> Trace:
+def read_trace(traced: tuple[list[float], _kernel.Reason], robot: AnyRobot, scene: Scene, space: int) -> Trace:
     """The shapes that the kernel has written one after the other."""
     parts = ((robot.segments + 1, 3), (len(robot.lines_mm), robot.positions, space), (len(scene), space))
     ends = np.cumsum([math.prod(part) for part in parts])
@@ -37,4 +36,4 @@ def read_trace(traced: tuple[list[float], int], robot: AnyRobot, scene: Scene, s
     rows = np.reshape(numbers, (-1, int(ends[-1])))
     columns = np.split(rows, ends[:-1], axis=1)
     nodes, points, moved = (column.reshape(-1, *part) for column, part in zip(columns, parts, strict=True))
-    return Trace(nodes, points, moved, REASONS[reason])
+    return Trace(nodes, points, moved, "" if reason is _kernel.Reason.NONE else reason.name.lower())

@@ -5,26 +5,47 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
-#include "solve/continuation.hpp"
 #include "pool.hpp"
+#include "solve/continuation.hpp"
 
 namespace ccr {
 
-// Each robot's answer is its own: it depends neither on the others, nor on how many threads share the work.
+// Results do not depend on the other robots, nor on the number of threads. One thread at a time uses a batch.
 template <int D>
 class Batch {
  public:
-  Batch(const Robot& robot, int count, int obstacles, int threads) : scenes_(count), pool_(threads - 1) {
+  // Taken by the thread that uses the batch; refuses another one meanwhile.
+  class Lock {
+   public:
+    explicit Lock(Batch& batch) : busy_(batch.busy_) {
+      if (busy_.test_and_set())
+        throw std::runtime_error("the batch is in use by another thread; give each thread a batch of its own");
+    }
+    Lock(const Lock&) = delete;
+    ~Lock() { busy_.clear(); }
+
+   private:
+    std::atomic_flag& busy_;
+  };
+
+  Batch(const Robot& robot, int count, int obstacles, int threads)
+      : obstacles_(obstacles), scenes_(count), pool_(threads - 1) {
     for (int k = 0; k < threads; ++k) workers_.push_back(make_continuation<D>(robot, obstacles));
   }
 
   const BlockLayout& layout() const { return workers_[0]->layout(); }
-  std::vector<Obstacle<D>>& scene(int robot) { return scenes_[robot]; }
+  int count() const { return static_cast<int>(scenes_.size()); }
+  int obstacles() const { return obstacles_; }  // of each scene
 
-  // Calls `work` with a continuation among the obstacles of each of some robots, and the place of the robot in the list, until
-  // the calling thread is told to `stop`.
+  // Puts a robot, by its index, among other obstacles.
+  void set_obstacles(int robot, std::vector<Obstacle<D>> obstacles) { scenes_[robot] = std::move(obstacles); }
+
+  // Calls `work` with a continuation among the obstacles of each of these robots, and its index in the list, until `stop`
+  // returns true in the calling thread.
   template <class Work, class Stop>
   void each(const std::vector<int>& robots, Work work, Stop&& stop) {
     std::atomic<int> next = 0;
@@ -40,7 +61,7 @@ class Batch {
       }
     };
     if (workers_.size() == 1 || count <= kAlone) return run(0);
-    pool_.run(std::ref(run));  // a function that holds it would be allocated
+    pool_.run(std::ref(run));  // a function that owned it would be allocated
   }
 
   template <class Work>
@@ -51,11 +72,13 @@ class Batch {
 
  private:
   static constexpr int kChunk = 2;   // robots taken at a time
-  static constexpr int kAlone = 16;  // robots that are not worth waking a thread for
+  static constexpr int kAlone = 16;  // so few robots are not worth waking a thread for
 
+  int obstacles_;
   std::vector<std::vector<Obstacle<D>>> scenes_;
   std::vector<std::unique_ptr<Continuation<D>>> workers_;
   Pool pool_;
+  std::atomic_flag busy_;
 };
 
 }  // namespace ccr

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver import _kernel
 from solver.common.batch import BaseBatch
-from solver.common.layout import CABLE, PLANE, Layout
+from solver.common.layout import PLANE, Layout
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.planar.equilibrium import Equilibrium
@@ -31,10 +31,10 @@ class BatchSolver(BaseBatch):
     def _make_layout(self, obstacles: int) -> Layout:
         return layout(self.robot, obstacles)
 
-    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.Fleet:
-        return _kernel.Fleet(kernel_robot(self.robot), self.count, obstacles, threads)
+    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.Batch:
+        return _kernel.Batch(kernel_robot(self.robot), self.count, obstacles, threads)
 
-    def _kernel_scene(self, scene: Scene) -> _kernel.Scene:
+    def _kernel_obstacles(self, scene: Scene) -> list[_kernel.Obstacle]:
         return kernel_scene(self.robot, scene)
 
     def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> Equilibrium:
@@ -52,10 +52,11 @@ class ReferenceBatch(BatchSolver):
             scene = self._scenes[robot]
             assert scene is not None
             reference = _reference(self.robot, scene)
-            if self.commands[robot, CABLE] == 0 and not self.blocks[robot, CABLE]:
+            (present,), wanted = self.layout.cables(self.blocks[robot]), float(self.commands[robot, 0])
+            if wanted == 0 and not present:
                 reached = reference.rest()
             else:
-                reached = reference.step(self._equilibrium(robot), float(self.commands[robot, CABLE]))
+                reached = reference.step(self._equilibrium(robot), wanted)
             self.blocks[robot] = reached.block
             self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
 

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from solver.common.equilibrium import BaseEquilibrium
-from solver.common.layout import CABLE, LENGTH, TENSION, Layout
+from solver.common.layout import Layout
 from solver.planar.formulation import node_derivatives
 from solver.planar.geometry import touching_points
 from solver.planar.layout import layout
@@ -29,17 +29,17 @@ class Equilibrium(BaseEquilibrium):
     @property
     def cable_mm(self) -> float:
         """Cable displacement l, which differs from the command where it stalled or was blocked [mm]."""
-        return float(self.block[CABLE])
+        return float(self.block[self._layout.cables.at])
 
     @property
     def length_mm(self) -> float:
         """Length of the backbone L0, which insertion changes [mm]."""
-        return float(self.block[LENGTH])
+        return float(self.block[self._layout.length.at])
 
     @property
     def tension(self) -> float:
         """Cable tension dE/dl along the branch [N]."""
-        return float(self.block[TENSION])
+        return float(self.block[self._layout.tensions.at])
 
     @property
     def shear(self) -> np.ndarray:

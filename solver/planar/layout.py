@@ -1,10 +1,14 @@
 """The memory layout of equilibria in the plane."""
 
-from solver.common.layout import PLANE, SLIDING, Layout, make_layout
+from solver.common.layout import PLANE, ROD, Layout, Model, make_layout
 from solver.planar.robot import Robot
 
 
+def layout_model(robot: Robot) -> Model:
+    """Return how many numbers describe a robot."""
+    return ROD if robot.model == "rod" else PLANE
+
+
 def layout(robot: Robot, obstacles: int) -> Layout:
-    """The layout for a robot among a number of obstacles."""
-    model = SLIDING if robot.model == "rod" else PLANE
-    return make_layout(model, robot.segments, len(robot.touch), robot.positions, obstacles)
+    """Return the layout for a robot among a number of obstacles."""
+    return make_layout(layout_model(robot), robot.segments, len(robot.touch), robot.positions, obstacles)

@@ -5,12 +5,13 @@ import numpy as np
 from solver import _kernel
 from solver.common.checks import check_clear, check_core, check_origin, check_scene
 from solver.common.equilibrium import Optimality
-from solver.common.kernel_input import scene_arrays
-from solver.common.layout import LENGTH, PLANE
+from solver.common.kernel_input import kernel_obstacles
+from solver.common.layout import PLANE
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
 from solver.common.validation import number
 from solver.planar.equilibrium import Equilibrium
+from solver.planar.layout import layout, layout_model
 from solver.planar.robot import Robot
 
 
@@ -38,7 +39,7 @@ class Solver:
         check_core(robot, scene)
         self._kernel = _kernel.Kernel(kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
-        straight[LENGTH] = robot.length_mm
+        straight[layout(robot, len(scene)).length.at] = robot.length_mm
         self._rest = self._follow(straight, 0.0, robot.length_mm)
         check_clear(robot, scene, self._rest.gaps)
 
@@ -107,7 +108,7 @@ class Solver:
 def kernel_robot(robot: Robot) -> _kernel.Robot:
     """A robot as the kernel takes it."""
     return _kernel.Robot(
-        sliding=robot.model == "rod",
+        model=layout_model(robot).kind,
         segments=robot.segments,
         offset=robot.offset_mm,
         angle=0.0,
@@ -122,14 +123,14 @@ def kernel_robot(robot: Robot) -> _kernel.Robot:
     )
 
 
-def kernel_scene(robot: Robot, scene: Scene) -> _kernel.Scene:
+def kernel_scene(robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:
     """Obstacles as the kernel takes them.
 
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
         RuntimeError: If a custom shape cannot be compiled.
     """
-    return _kernel.Scene(*scene_arrays(robot, scene))
+    return [_kernel.Obstacle(**obstacle) for obstacle in kernel_obstacles(robot, scene)]
 
 
 def check_command(

@@ -8,7 +8,7 @@ from solver import _kernel
 from solver.common.batch import BaseBatch
 from solver.common.checks import check_clear, check_core, check_origin, check_scene
 from solver.common.equilibrium import Optimality
-from solver.common.kernel_input import scene_arrays
+from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import SPACE, Layout, Model
 from solver.common.scene import Scene
 from solver.common.status import Status
@@ -40,7 +40,7 @@ class SpatialSolver:
         check_core(robot, scene)
         self._kernel = _kernel.SpatialKernel(kernel_robot(robot), kernel_scene(robot, scene))
         straight = np.zeros(self._kernel.block_size)
-        straight[spatial_layout(robot, len(scene)).length_at] = robot.length_mm
+        straight[spatial_layout(robot, len(scene)).length.at] = robot.length_mm
         self._rest = self._follow(straight, np.zeros(2))
         check_clear(robot, scene, self._rest.gaps)
 
@@ -120,10 +120,10 @@ class SpatialBatchSolver(BaseBatch):
     def _make_layout(self, obstacles: int) -> Layout:
         return spatial_layout(self.robot, obstacles)
 
-    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialFleet:
-        return _kernel.SpatialFleet(kernel_robot(self.robot), self.count, obstacles, threads)
+    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialBatch:
+        return _kernel.SpatialBatch(kernel_robot(self.robot), self.count, obstacles, threads)
 
-    def _kernel_scene(self, scene: Scene) -> _kernel.SpatialScene:
+    def _kernel_obstacles(self, scene: Scene) -> list[_kernel.SpatialObstacle]:
         return kernel_scene(self.robot, scene)
 
     def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> SpatialEquilibrium:
@@ -133,7 +133,7 @@ class SpatialBatchSolver(BaseBatch):
 def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
     """A robot as the kernel takes it."""
     return _kernel.Robot(
-        sliding=False,
+        model=SPACE.kind,
         segments=robot.segments,
         offset=robot.offset_mm,
         angle=robot.angle,
@@ -148,13 +148,13 @@ def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
     )
 
 
-def kernel_scene(robot: SpatialRobot, scene: Scene) -> _kernel.SpatialScene:
+def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:
     """Obstacles as the kernel takes them.
 
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
     """
-    return _kernel.SpatialScene(*scene_arrays(robot, scene))
+    return [_kernel.SpatialObstacle(**obstacle) for obstacle in kernel_obstacles(robot, scene)]
 
 
 def check_cables(

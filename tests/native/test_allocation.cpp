@@ -149,7 +149,7 @@ TEST_CASE("a batch's steps allocate nothing") {
   Batch<2> batch(robot, kCount, 1, 2);
   std::vector<int> robots;
   for (int i = 0; i < kCount; ++i) {
-    batch.scene(i) = {circle(robot, 44 + 0.1 * i, 104, 15)};
+    batch.set_obstacles(i, {circle(robot, 44 + 0.1 * i, 104, 15)});
     robots.push_back(i);
   }
   std::vector<double> blocks(kCount * batch.layout().size);

@@ -72,7 +72,7 @@ struct Work {
   Reached together(int threads, int at_a_time, bool backwards) const {
     const int count = static_cast<int>(settings.size());
     Batch<D> batch(robot, count, kObstacles, threads);
-    for (int i = 0; i < count; ++i) batch.scene(i) = settings[static_cast<std::size_t>(i)].obstacles;
+    for (int i = 0; i < count; ++i) batch.set_obstacles(i, settings[static_cast<std::size_t>(i)].obstacles);
     Reached out = begin();
     for (int step = 0; step < kSteps; ++step)
       for (int first = 0; first < count; first += at_a_time) {

@@ -279,7 +279,7 @@ def test_a_block_that_no_robot_can_have_stays_as_it_is():
     batch.assign(0, Scene())
     batch.rest([0])
     batch.blocks[:] = 1e300
-    batch.blocks[0, batch.layout.length_at] = 180.0
+    batch.blocks[0, batch.layout.length.at] = 180.0
     written = batch.blocks.copy()
     batch.step(np.array([4.0]))
     assert batch.statuses[0] == Status.GAVE_UP

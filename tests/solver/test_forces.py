@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from solver import Capsule, Circle, Ellipse, Equilibrium, HalfPlane, Polygon, Robot, Scene, Solver
-from solver.common.layout import TENSION
 from solver.planar.forces import VirtualWork, force_true, onset_tension
 from solver.planar.formulation import limits, node_derivatives
 from solver.planar.free import fitted_slopes, tip_slopes
@@ -136,7 +135,7 @@ def test_estimate_knows_nothing_of_the_material(scene):
     scaled = Scene(replace(o, spring=k) for o, k in zip(scene, springs, strict=True))
     block = equilibrium.block.copy()
     places = layout(stiffer, len(scene))
-    for scaling in (lambda block: block[TENSION : TENSION + 1], places.onset, places.forces, places.force):
+    for scaling in (places.tensions, places.onset, places.forces, places.force):
         scaling(block)[:] *= 3
     same = Equilibrium(stiffer, scaled, block, equilibrium.status, 0)
     estimate = VirtualWork().estimate(equilibrium)

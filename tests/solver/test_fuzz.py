@@ -268,7 +268,7 @@ def test_batches(spatially, first, second, third):
     ):
         survives(call)
     assert not np.isnan(batch.blocks).any()
-    assert (batch.blocks[:, batch.layout.clearance_at] >= -1e-9).all()
+    assert (batch.blocks[:, batch.layout.clearance.at] >= -1e-9).all()
 
 
 @fuzz
@@ -292,7 +292,7 @@ def test_blocks(spatially, place, number, junk, other):
 @pytest.mark.parametrize("length", [-1.0, 0.0, math.nan, math.inf, 1e300])
 def test_a_length_written_into_a_batch(spatially, length):
     batch = make_batch(spatially)
-    batch.blocks[1, batch.layout.length_at] = length
+    batch.blocks[1, batch.layout.length.at] = length
     with pytest.raises(ValueError, match=r"lengths in blocks are .*; all must be from 1.0 to .*: call rest\(robots\)"):
         batch.step(np.ones((3, 2)) if spatially else np.ones(3))
     batch.rest([1])

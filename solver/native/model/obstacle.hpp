@@ -14,8 +14,6 @@ namespace ccr {
 enum class Shape {
   kCircle, kHalfPlane, kEllipse, kCapsule, kPolygon, kSphere, kHalfSpace, kSpatialCapsule, kCylinder, kBox, kCustom
 };
-inline constexpr const char* kShapeNames =
-    "circle half_plane ellipse capsule polygon sphere half_space spatial_capsule cylinder box custom";
 
 // A compiled gap law: (point, parameters) to a Gap.
 using Law = int (*)(const double** in, double** out, int*, double*, int);
