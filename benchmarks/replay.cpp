@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "solve/continuation.hpp"
 #include "robots.hpp"
+#include "solve/continuation.hpp"
 
 namespace {
 

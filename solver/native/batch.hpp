@@ -44,8 +44,8 @@ class Batch {
   // Puts a robot, by its index, among other obstacles.
   void set_obstacles(int robot, std::vector<Obstacle<D>> obstacles) { scenes_[robot] = std::move(obstacles); }
 
-  // Calls `work` with a continuation among the obstacles of each of these robots, and its index in the list, until `stop`
-  // returns true in the calling thread.
+  // Calls `work` with a continuation among the obstacles of each of these robots, and its index in the list, until
+  // `stop` returns true in the calling thread.
   template <class Work, class Stop>
   void each(const std::vector<int>& robots, Work work, Stop&& stop) {
     std::atomic<int> next = 0;

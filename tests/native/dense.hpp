@@ -71,8 +71,8 @@ inline double apart(const Column& a, const Column& b) {
   return farthest;
 }
 
-// Cholesky factor in place of a symmetric matrix, below the diagonal. Returns the smallest pivot over the diagonal entry it
-// came from: positive exactly where the matrix is positive definite.
+// Cholesky factor in place of a symmetric matrix, below the diagonal. Returns the smallest pivot over the diagonal
+// entry it came from: positive exactly where the matrix is positive definite.
 inline double cholesky(Dense& a) {
   double least = 1;
   for (int j = 0; j < a.rows(); ++j) {

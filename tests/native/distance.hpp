@@ -1,4 +1,5 @@
-// Signed distances of points from obstacles, negative inside, from their geometry alone: nothing of the gap laws is used.
+// Signed distances of points from obstacles, negative inside, from their geometry alone: nothing of the gap laws is
+// used.
 #pragma once
 
 #include <algorithm>
@@ -45,7 +46,9 @@ inline double polygon_distance(const double* p, const Position<2>& point) {
 inline double ellipse_distance(const double* p, const Position<2>& point) {
   const Position<2> offset = minus(point, position<2>(p));
   const double along = offset[0] * p[4] + offset[1] * p[5], across = offset[1] * p[4] - offset[0] * p[5];
-  const auto distance = [&](double angle) { return std::hypot(p[2] * std::cos(angle) - along, p[3] * std::sin(angle) - across); };
+  const auto distance = [&](double angle) {
+    return std::hypot(p[2] * std::cos(angle) - along, p[3] * std::sin(angle) - across);
+  };
   constexpr int kParts = 72;
   int best = 0;
   for (int k = 1; k < kParts; ++k)

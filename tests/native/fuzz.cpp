@@ -1,11 +1,11 @@
-// Random robots, scenes and commands, every step looked at: fuzz SEED [SECONDS]. Episode k has the seed SEED + k and depends
-// on nothing else; the last one is cut short when the time is up. Without a time it is the one episode of the seed, which
-// shows again what failed.
+// Random robots, scenes and commands, every step looked at: fuzz SEED [SECONDS]. Episode k has the seed SEED + k and
+// depends on nothing else; the last one is cut short when the time is up. Without a time it is the one episode of the
+// seed, which shows again what failed.
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <cstdint>
 
 #include "scenes.hpp"
 
@@ -15,24 +15,26 @@ extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak))
 namespace ccr::testing {
 namespace {
 
-constexpr int kSteps = 100;            // of an episode
-constexpr double kLeastGap = -1e-12;   // over the length of the robot, as is the largest of an active one
-constexpr double kLimitBand = 1e-9;    // by which a tension may be above its limit, as a fraction
+constexpr int kSteps = 100;           // of an episode
+constexpr double kLeastGap = -1e-12;  // over the length of the robot, as is the largest of an active one
+constexpr double kLimitBand = 1e-9;   // by which a tension may be above its limit, as a fraction
 constexpr int kStatuses = 5;
 
-constexpr double kOptimal = 1e-8;      // stationarity and complementarity, without units
+constexpr double kOptimal = 1e-8;  // stationarity and complementarity, without units
 
 using Clock = std::chrono::steady_clock;
 
 std::uint64_t present = 0;  // seed of the episode under way
 
-void tell() { std::fprintf(stderr, "fuzz: failed in the episode of seed %llu\n", static_cast<unsigned long long>(present)); }
+void tell() {
+  std::fprintf(stderr, "fuzz: failed in the episode of seed %llu\n", static_cast<unsigned long long>(present));
+}
 
 struct Tally {
   long episodes = 0, steps = 0, touching = 0, iterations = 0;
   long statuses[kStatuses] = {};
   std::uint64_t seen[kStatuses] = {};  // seed of the episode that met a status last
-  int hardest = 0;  // factorisations of a step
+  int hardest = 0;                     // factorisations of a step
 };
 
 template <int D>
@@ -40,7 +42,8 @@ const char* fault(const Robot& robot, const BlockLayout& layout, int status, con
   if (status < 0 || status >= kStatuses) return "a status that there is not";
   for (const double number : block)
     if (!std::isfinite(number)) return "a number that is not finite";
-  if (layout.gaps.size > 0 && block[layout.clearance.offset] < kLeastGap * robot.max_length) return "a point in an obstacle";
+  if (layout.gaps.size > 0 && block[layout.clearance.offset] < kLeastGap * robot.max_length)
+    return "a point in an obstacle";
   for (std::size_t c = 0; c < layout.gaps.size; ++c) {
     if (block[layout.multipliers.offset + c] < 0) return "a contact that pulls";
     if (block[layout.gaps.offset + c] < block[layout.clearance.offset]) return "a gap below the smallest one";
@@ -76,11 +79,15 @@ bool run(Random& random, Clock::time_point end, Tally& tally) {
     const Optimality optimality = continuation->optimality(to.data());
     if (!why) why = fault(optimality);
     if (why) {
-      std::fprintf(stderr, "fuzz: %s in step %d (status %d, robot of %.4g mm, %d segments, %s, %zu obstacles)\n", why, step,
-                   status, of.length, of.segments, D == 3 ? "space" : of.rod ? "rod" : "paper",
+      std::fprintf(stderr, "fuzz: %s in step %d (status %d, robot of %.4g mm, %d segments, %s, %zu obstacles)\n", why,
+                   step, status, of.length, of.segments,
+                   D == 3   ? "space"
+                   : of.rod ? "rod"
+                            : "paper",
                    setting.obstacles.size());
       std::fprintf(stderr, "fuzz: tension %.12g of its limit, stationarity %.3g, gap %.3g L, complementarity %.3g\n",
-                   to[layout.tensions.offset] / of.max_tension, optimality.stationarity, optimality.gap, optimality.complementarity);
+                   to[layout.tensions.offset] / of.max_tension, optimality.stationarity, optimality.gap,
+                   optimality.complementarity);
       return false;
     }
     ++tally.steps;
@@ -88,7 +95,8 @@ bool run(Random& random, Clock::time_point end, Tally& tally) {
     tally.seen[status] = present;
     tally.iterations += result.iterations;
     tally.hardest = std::max(tally.hardest, result.factorizations);
-    tally.touching += std::any_of(&to[layout.force.offset], &to[layout.force.offset] + D, [](double part) { return part != 0; });
+    tally.touching +=
+        std::any_of(&to[layout.force.offset], &to[layout.force.offset] + D, [](double part) { return part != 0; });
     std::swap(now, to);
   }
   return true;
@@ -113,7 +121,8 @@ int main(int count, char** arguments) {
   if (__sanitizer_set_death_callback) __sanitizer_set_death_callback(tell);
   const std::uint64_t seed = std::strtoull(arguments[1], nullptr, 10);
   const bool once = count == 2;
-  const auto time = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(once ? 0 : std::atof(arguments[2])));
+  const auto time =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(once ? 0 : std::atof(arguments[2])));
   const auto end = once ? Clock::time_point::max() : Clock::now() + time;
   Tally tally;
   do {
@@ -122,8 +131,10 @@ int main(int count, char** arguments) {
       return 1;
     }
   } while (!once && Clock::now() < end);
-  std::printf("fuzz: %ld episodes, %ld steps, %ld of them in contact, %ld iterations, at most %d factorisations in a step; statuses",
-              tally.episodes, tally.steps, tally.touching, tally.iterations, tally.hardest);
+  std::printf(
+      "fuzz: %ld episodes, %ld steps, %ld of them in contact, %ld iterations, at most %d factorisations in a step; "
+      "statuses",
+      tally.episodes, tally.steps, tally.touching, tally.iterations, tally.hardest);
   for (int k = 0; k < kStatuses; ++k) {
     std::printf(" %ld", tally.statuses[k]);
     if (k > 2 && tally.statuses[k] > 0) std::printf(" (seed %llu)", static_cast<unsigned long long>(tally.seen[k]));

@@ -3,12 +3,12 @@
 
 #include <doctest/doctest.h>
 
-#include "solve/contact_problem.hpp"
 #include "dense.hpp"
-#include "solve/kkt_system.hpp"
 #include "model/models.hpp"
 #include "random.hpp"
 #include "robots.hpp"
+#include "solve/contact_problem.hpp"
+#include "solve/kkt_system.hpp"
 
 namespace ccr::testing {
 

@@ -98,8 +98,7 @@ inline Extent<2> polygon_extent(const double* p) {
   for (int k = 0; k < kCorners; ++k)
     for (int c = 0; c < 2; ++c) center[c] += p[1 + 2 * k + c] / kCorners;
   double farthest = 0;
-  for (int k = 0; k < kCorners; ++k)
-    farthest = std::max(farthest, norm(minus(position<2>(p + 1 + 2 * k), center)));
+  for (int k = 0; k < kCorners; ++k) farthest = std::max(farthest, norm(minus(position<2>(p + 1 + 2 * k), center)));
   return {center, farthest + p[0], p[0]};
 }
 

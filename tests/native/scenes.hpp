@@ -7,9 +7,9 @@
 #include <numbers>
 #include <vector>
 
-#include "solve/continuation.hpp"
 #include "random.hpp"
 #include "robots.hpp"
+#include "solve/continuation.hpp"
 
 namespace ccr::testing {
 
@@ -47,7 +47,8 @@ inline Obstacle<2> random_obstacle(Random& random, const Robot& robot, int shape
       return made(Shape::kHalfPlane, {nx, ny, nx * at[0] + ny * at[1]});
     }
     case 2: return made(Shape::kEllipse, {at[0], at[1], r * random.uniform(1, 2), r, way[0], way[1]});
-    case 3: return made(Shape::kCapsule, {at[0] - r * way[0], at[1] - r * way[1], at[0] + r * way[0], at[1] + r * way[1], r});
+    case 3:
+      return made(Shape::kCapsule, {at[0] - r * way[0], at[1] - r * way[1], at[0] + r * way[0], at[1] + r * way[1], r});
     case 4: {
       const int corners = random.integer(3, 8);
       const double edge = r * random.decades(-2, -0.3), turned = random.uniform(0, 7);
@@ -76,17 +77,18 @@ inline Obstacle<3> random_obstacle(Random& random, const Robot& robot, int shape
       return made(Shape::kHalfSpace, {nx, ny, 0, nx * at[0] + ny * at[1]});
     }
     case 2:
-      return made(Shape::kSpatialCapsule, {at[0] - r * way[0], at[1] - r * way[1], at[2] - r * way[2], at[0] + r * way[0],
-                                           at[1] + r * way[1], at[2] + r * way[2], r});
+      return made(Shape::kSpatialCapsule, {at[0] - r * way[0], at[1] - r * way[1], at[2] - r * way[2],
+                                           at[0] + r * way[0], at[1] + r * way[1], at[2] + r * way[2], r});
     case 3:
-      return made(Shape::kCylinder, {at[0], at[1], at[2], way[0], way[1], way[2], r - edge, r * random.uniform(1, 2) - edge, edge});
+      return made(Shape::kCylinder,
+                  {at[0], at[1], at[2], way[0], way[1], way[2], r - edge, r * random.uniform(1, 2) - edge, edge});
     default: {
       Vec<3> second = cross(way, random.direction<3>());
       const double size = norm(second);
       for (double& part : second.v) part /= size;
       const Vec<3> third = cross(way, second);
-      return made(Shape::kBox, {at[0], at[1], at[2], way[0], way[1], way[2], second[0], second[1], second[2], third[0], third[1],
-                                third[2], r - edge, r * random.uniform(1, 2) - edge, r - edge, edge});
+      return made(Shape::kBox, {at[0], at[1], at[2], way[0], way[1], way[2], second[0], second[1], second[2], third[0],
+                                third[1], third[2], r - edge, r * random.uniform(1, 2) - edge, r - edge, edge});
     }
   }
 }
@@ -139,7 +141,8 @@ Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, dou
     const double r = std::max(of.length * random.uniform(0.04, 0.1), 0.55 * longest);
     const double unit = of.rigidity / (of.length * of.length * of.length);
     const double spring = random.chance(springs) ? unit * random.decades(0, 4) : 0;
-    const std::vector<Obstacle<D>> alone = {random_obstacle(random, out.robot, random.integer(0, kShapes<D> - 1), at, r, spring)};
+    const std::vector<Obstacle<D>> alone = {
+        random_obstacle(random, out.robot, random.integer(0, kShapes<D> - 1), at, r, spring)};
     continuation->set_obstacles(alone);
     const std::vector<double> rest = rest_block(*continuation, of.length);
     if (rest[continuation->layout().clearance.offset] > 1e-3 * of.length) out.obstacles.push_back(alone[0]);

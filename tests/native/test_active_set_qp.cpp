@@ -1,6 +1,6 @@
 // Active-set problems built backwards from their answer: the shape is free, the gaps are walls that one point each can
-// touch, so that a wall's normal gives its gradient and its offset any gap that is wanted. The cable of a rod is one more
-// gap, its slack, which the displacement sets.
+// touch, so that a wall's normal gives its gradient and its offset any gap that is wanted. The cable of a rod is one
+// more gap, its slack, which the displacement sets.
 #include <algorithm>
 
 #include "problems.hpp"
@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kLargest = 2e-5;  // multiplier of a wall, which leaves the curvature positive [rad²/mm]
 constexpr double kTaut = 0.0125;   // of a cable that holds the shape, about
-constexpr double kAway = 0.002;    // coordinates from where nothing moves, so that the step stays within reach of the walls
+constexpr double kAway =
+    0.002;  // coordinates from where nothing moves, so that the step stays within reach of the walls
 
 template <class Model>
 struct Wanted {
@@ -20,9 +21,15 @@ struct Wanted {
   using Slope = typename ContactProblem<Model>::Slope;
 
   Wanted(Random& random, int walls)
-      : of(numbers_of<Model>(8)), robot(make_robot(of, {{{0, 0}}})), problem(robot, walls),
-        at(random_shape<Model>(random, of, 0, kAway)), kkt(of.segments, 0), step(of.segments, 0), normals(walls),
-        points(walls), gaps(walls + Model::kRod) {
+      : of(numbers_of<Model>(8)),
+        robot(make_robot(of, {{{0, 0}}})),
+        problem(robot, walls),
+        at(random_shape<Model>(random, of, 0, kAway)),
+        kkt(of.segments, 0),
+        step(of.segments, 0),
+        normals(walls),
+        points(walls),
+        gaps(walls + Model::kRod) {
     for (int j = 0; j < walls; ++j) {
       normals[j] = random.template direction<kSpace>();
       points[j] = 1 + (j * 3) % of.segments;
@@ -44,7 +51,8 @@ struct Wanted {
     if constexpr (Model::kRod) at.command.cables[0] = problem.states().back()[3] - gaps.back();
     obstacles.clear();
     for (int j = 0; j < walls(); ++j)
-      obstacles.push_back(for_point(wall<kSpace>(robot, normals[j], dot(normals[j], problem.points()[points[j]]) - gaps[j]), points[j]));
+      obstacles.push_back(for_point(
+          wall<kSpace>(robot, normals[j], dot(normals[j], problem.points()[points[j]]) - gaps[j]), points[j]));
     problem.set_obstacles(obstacles);
     update_broadphase(problem, at);
     REQUIRE(problem.evaluate(at));
@@ -228,10 +236,16 @@ void restorations() {
 
 #define CCR_MODELS Planar<PaperLaw>, Planar<RodLaw>, Spatial
 
-TEST_CASE_TEMPLATE("the active set and multipliers are those that were chosen", Model, CCR_MODELS) { chosen_sets<Model>(); }
-TEST_CASE_TEMPLATE("gaps that depend on each other leave the step alone", Model, CCR_MODELS) { dependent_gaps<Model>(); }
+TEST_CASE_TEMPLATE("the active set and multipliers are those that were chosen", Model, CCR_MODELS) {
+  chosen_sets<Model>();
+}
+TEST_CASE_TEMPLATE("gaps that depend on each other leave the step alone", Model, CCR_MODELS) {
+  dependent_gaps<Model>();
+}
 TEST_CASE_TEMPLATE("a problem without an answer is given up", Model, CCR_MODELS) { no_answer<Model>(); }
-TEST_CASE_TEMPLATE("a restoration is the smallest step that closes the gaps", Model, CCR_MODELS) { restorations<Model>(); }
+TEST_CASE_TEMPLATE("a restoration is the smallest step that closes the gaps", Model, CCR_MODELS) {
+  restorations<Model>();
+}
 
 }  // namespace
 }  // namespace ccr::testing

@@ -31,7 +31,8 @@ template <int D>
 class Pulled {
  public:
   Pulled(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles)
-      : of_(of), obstacles_(obstacles),
+      : of_(of),
+        obstacles_(obstacles),
         continuation_(make_continuation<D>(make_robot<D>(of), static_cast<int>(obstacles.size()))) {
     continuation_->set_obstacles(obstacles_);
     now_ = to_ = rest_block(*continuation_, of.length);
@@ -120,11 +121,13 @@ TEST_CASE("steps beside every shape allocate nothing") {
   const Robot plane = make_robot<2>(prototype()), space = make_robot<3>(prototype());
   for (int shape = 0; shape < kShapes<2>; ++shape) {
     CAPTURE(shape);
-    CHECK(twice<2>(prototype(), {random_obstacle(random, plane, shape, Position<2>{{50, 100}}, 12, 0)}, 6).allocated == 0);
+    CHECK(twice<2>(prototype(), {random_obstacle(random, plane, shape, Position<2>{{50, 100}}, 12, 0)}, 6).allocated ==
+          0);
   }
   for (int shape = 0; shape < kShapes<3>; ++shape) {
     CAPTURE(shape);
-    CHECK(twice<3>(prototype(), {random_obstacle(random, space, shape, Position<3>{{50, 20, 100}}, 12, 0)}, 6).allocated == 0);
+    CHECK(twice<3>(prototype(), {random_obstacle(random, space, shape, Position<3>{{50, 20, 100}}, 12, 0)}, 6)
+              .allocated == 0);
   }
 }
 

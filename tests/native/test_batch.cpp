@@ -14,7 +14,8 @@ struct Work {
   explicit Work(Random& random, const RobotNumbers& of, int count) : robot(make_robot<D>(of)), length(of.length) {
     for (int i = 0; i < count; ++i) {
       settings.push_back(random_setting<D>(random, of, kObstacles));
-      for (int step = 1; step <= kSteps; ++step) wanted.push_back(towards(random, settings.back().obstacles[0].center, step));
+      for (int step = 1; step <= kSteps; ++step)
+        wanted.push_back(towards(random, settings.back().obstacles[0].center, step));
     }
   }
 
@@ -52,7 +53,8 @@ struct Work {
 
   Reached begin() const {
     Reached out;
-    for (const Setting<D>& setting : settings) out.blocks.insert(out.blocks.end(), setting.rest.begin(), setting.rest.end());
+    for (const Setting<D>& setting : settings)
+      out.blocks.insert(out.blocks.end(), setting.rest.begin(), setting.rest.end());
     out.statuses.assign(settings.size(), 0);
     out.iterations.assign(settings.size(), 0);
     return out;
@@ -77,8 +79,11 @@ struct Work {
     for (int step = 0; step < kSteps; ++step)
       for (int first = 0; first < count; first += at_a_time) {
         std::vector<int> robots;
-        for (int k = first; k < std::min(first + at_a_time, count); ++k) robots.push_back(backwards ? count - 1 - k : k);
-        batch.each(robots, [&](Continuation<D>& continuation, int k) { follow(continuation, robots[static_cast<std::size_t>(k)], step, out); });
+        for (int k = first; k < std::min(first + at_a_time, count); ++k)
+          robots.push_back(backwards ? count - 1 - k : k);
+        batch.each(robots, [&](Continuation<D>& continuation, int k) {
+          follow(continuation, robots[static_cast<std::size_t>(k)], step, out);
+        });
       }
     return out;
   }

@@ -79,7 +79,8 @@ void derivatives() {
         const Gap<D> more = measure_gap(obstacle, up), less = measure_gap(obstacle, down);
         CHECK(gap.slope[c] == doctest::Approx((more.value - less.value) / (2 * h)).epsilon(1e-6).scale(1));
         for (int row = 0; row < D; ++row)
-          CHECK(curvature(row, c) * r == doctest::Approx((more.slope[row] - less.slope[row]) / (2 * h) * r).epsilon(1e-5).scale(1));
+          CHECK(curvature(row, c) * r ==
+                doctest::Approx((more.slope[row] - less.slope[row]) / (2 * h) * r).epsilon(1e-5).scale(1));
       }
     }
   });

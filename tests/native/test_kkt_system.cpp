@@ -12,7 +12,9 @@ struct Touched {
 
   // A round obstacle on each of a few points, the first two of them on springs, the last beside the middle of an edge.
   explicit Touched(Random& random)
-      : of(numbers(random)), robot(make_robot<kSpace>(of)), problem(robot, kObstacles),
+      : of(numbers(random)),
+        robot(make_robot<kSpace>(of)),
+        problem(robot, kObstacles),
         at(random_shape<Model>(random, of, kSprings, 0.05)) {
     REQUIRE(problem.evaluate({at.command, at.controls, {}, {}}));
     for (int j = 0; j < kObstacles; ++j) {
@@ -130,7 +132,8 @@ void kkt_systems() {
 
     using Slope = typename ContactProblem<Model>::Slope;
     std::vector<Slope> loads;
-    std::vector<Direction<Model>> responses(touched.at.active.count + 1, Direction<Model>(touched.robot.segments, touched.kSprings));
+    std::vector<Direction<Model>> responses(touched.at.active.count + 1,
+                                            Direction<Model>(touched.robot.segments, touched.kSprings));
     for (int j = 0; j < touched.at.active.count; ++j) loads.push_back(problem.slope(touched.at.active.contact[j]));
     std::vector<typename KktSystem<Model>::Load> asked = {{nullptr, &responses.back()}};
     for (int j = 0; j < touched.at.active.count; ++j) asked.push_back({&loads[j], &responses[j]});
@@ -147,19 +150,22 @@ void kkt_systems() {
       for (int c = 0; c < n; ++c) row.push_back(gaps(j, c));
       compare(responses[j], row);
       for (int k = 0; k < touched.at.active.count; ++k)  // motion of the gaps along the response
-        CHECK(loads[k].along(responses[j]) ==
-              doctest::Approx([&] {
-                double along = 0;
-                const Column moved = flat<Model>(responses[j].controls, responses[j].mounts);
-                for (int c = 0; c < n; ++c) along += gaps(k, c) * moved[c];
-                return along;
-              }()).epsilon(1e-5).scale(std::abs(loads[j].along(responses[j]))));
+        CHECK(loads[k].along(responses[j]) == doctest::Approx([&] {
+                                                double along = 0;
+                                                const Column moved =
+                                                    flat<Model>(responses[j].controls, responses[j].mounts);
+                                                for (int c = 0; c < n; ++c) along += gaps(k, c) * moved[c];
+                                                return along;
+                                              }())
+                                                  .epsilon(1e-5)
+                                                  .scale(std::abs(loads[j].along(responses[j]))));
     }
   }
   CHECK(definite >= 5);
 }
 
-TEST_CASE_TEMPLATE("the slope of the Lagrangian is that of its value", Model, Planar<PaperLaw>, Planar<RodLaw>, Spatial) {
+TEST_CASE_TEMPLATE("the slope of the Lagrangian is that of its value", Model, Planar<PaperLaw>, Planar<RodLaw>,
+                   Spatial) {
   slopes<Model>();
 }
 

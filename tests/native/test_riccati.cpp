@@ -2,10 +2,10 @@
 #include <doctest/doctest.h>
 
 #include "dense.hpp"
-#include "model/planar.hpp"
-#include "random.hpp"
 #include "math/riccati.hpp"
+#include "model/planar.hpp"
 #include "model/spatial.hpp"
+#include "random.hpp"
 
 namespace ccr::testing {
 namespace {
@@ -34,8 +34,7 @@ template <int NX, int NU, class Transition>
 struct Problem {
   using System = Riccati<NX, NU, Transition>;
 
-  Problem(Random& random, int n, double shift)
-      : system(n), motion(NX * (n + 1), NU * n), hessian(NU * n, NU * n) {
+  Problem(Random& random, int n, double shift) : system(n), motion(NX * (n + 1), NU * n), hessian(NU * n, NU * n) {
     Dense curvature(NX * (n + 1), NX * (n + 1)), cross(NX * (n + 1), NU * n);
     for (int i = 0; i <= n; ++i) {
       system.node_hessian[i] = random.symmetric<NX>(shift / 2);
@@ -80,7 +79,8 @@ struct Problem {
 
   // H = Huu + Mᵀ Hxx M + Mᵀ Hxu + Hux M, where x = M u.
   void reduce(const Dense& curvature, const Dense& cross) {
-    const Dense seen = product(transposed(motion), product(curvature, motion)), mixed = product(transposed(motion), cross);
+    const Dense seen = product(transposed(motion), product(curvature, motion)),
+                mixed = product(transposed(motion), cross);
     for (int r = 0; r < hessian.rows(); ++r)
       for (int c = 0; c < hessian.columns(); ++c) hessian(r, c) += seen(r, c) + mixed(r, c) + mixed(c, r);
   }
@@ -151,7 +151,8 @@ void compare(std::uint64_t seed) {
       for (const auto& force : forces[k]) {
         double along = 0;
         for (int c = 0; c < NX; ++c)
-          along += force.here[c] * moved[NX * force.node + c] + (force.split ? force.next[c] * moved[NX * (force.node + 1) + c] : 0);
+          along += force.here[c] * moved[NX * force.node + c] +
+                   (force.split ? force.next[c] * moved[NX * (force.node + 1) + c] : 0);
         CHECK(std::abs(force.along(states[k]) - along) <= 1e-8 * (scale + reach) * NX);
       }
     }

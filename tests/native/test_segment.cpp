@@ -4,18 +4,18 @@
 #include <cstring>
 #include <numbers>
 
-#include "random.hpp"
 #include "model/segment.hpp"
+#include "random.hpp"
 
 namespace ccr {
 
 #ifdef CCR_AVX2
-#define CCR_DECLARE(REGISTERS)                                                                                          \
-  namespace REGISTERS {                                                                                                 \
-  void bend(int, const double*, double, double, double, PaperLaw::Bends&);                                          \
-  void bend(int, const double*, double, double, RodLaw::Bends&);                                                  \
-  bool bend(int, const SegmentInputs&, const Rows&, Rows&, Rows&);                                                    \
-  void hessian_contraction(int, const SegmentInputs&, const Rows&, const Rows&, const Rows&, Rows&);                                  \
+#define CCR_DECLARE(REGISTERS)                                                                       \
+  namespace REGISTERS {                                                                              \
+  void bend(int, const double*, double, double, double, PaperLaw::Bends&);                           \
+  void bend(int, const double*, double, double, RodLaw::Bends&);                                     \
+  bool bend(int, const SegmentInputs&, const Rows&, Rows&, Rows&);                                   \
+  void hessian_contraction(int, const SegmentInputs&, const Rows&, const Rows&, const Rows&, Rows&); \
   }
 CCR_DECLARE(baseline)
 CCR_DECLARE(avx2)
@@ -73,7 +73,8 @@ TEST_CASE("the slopes of the paper's segment are those of its shape") {
         CAPTURE(pull);
         CAPTURE(sine);
         const double h = kDifference;
-        const auto at = paper(sine, pull, scale), more = paper(sine + h, pull, scale), less = paper(sine - h, pull, scale);
+        const auto at = paper(sine, pull, scale), more = paper(sine + h, pull, scale),
+                   less = paper(sine - h, pull, scale);
         CHECK(near(at.slope, (more.angle - less.angle) / (2 * h), 1));
         CHECK(near(at.curvature, (more.slope - less.slope) / (2 * h), 1));
         CHECK(near(at.heading_slope, (heading(more) - heading(less)) / (2 * h), 1));
@@ -124,11 +125,14 @@ struct InSpace {
 static_assert(sizeof(InSpace) == SpatialLaw::kBend * sizeof(double));
 
 SegmentInputs segment_inputs(const Vec<2>& pulls, double angle, double scale) {
-  return {{pulls[0] * scale, pulls[1] * scale}, 10 * scale, {8 * scale, 0, 8 * scale * std::cos(angle), 8 * scale * std::sin(angle)}};
+  return {{pulls[0] * scale, pulls[1] * scale},
+          10 * scale,
+          {8 * scale, 0, 8 * scale * std::cos(angle), 8 * scale * std::sin(angle)}};
 }
 
 struct Space {
-  explicit Space(int n) : controls(SpatialLaw::kControl, n), bendings(SpatialLaw::kBending, n), bends(SpatialLaw::kBend, n) {}
+  explicit Space(int n)
+      : controls(SpatialLaw::kControl, n), bendings(SpatialLaw::kBending, n), bends(SpatialLaw::kBend, n) {}
 
   bool bend(int n, const SegmentInputs& inputs) { return SpatialLaw::bend(n, inputs, controls, bendings, bends); }
   InSpace at(int segment) const {
@@ -147,7 +151,8 @@ InSpace in_space(const Vec<3>& control, const SegmentInputs& inputs) {
   return space.at(0);
 }
 
-Mat<3, 3> hessian_contraction(const Vec<3>& control, const SegmentInputs& inputs, const Vec<3>& force, const Vec<3>& moment) {
+Mat<3, 3> hessian_contraction(const Vec<3>& control, const SegmentInputs& inputs, const Vec<3>& force,
+                              const Vec<3>& moment) {
   Space space(1);
   space.controls.put(0, control.v.data(), 3);
   REQUIRE(space.bend(1, inputs));
@@ -174,7 +179,8 @@ Vec<3> turn(const Mat<3, 3>& from, const Mat<3, 3>& to) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < 3; ++k) between(r, c) += to(r, k) * from(c, k);
-  return {{(between(2, 1) - between(1, 2)) / 2, (between(0, 2) - between(2, 0)) / 2, (between(1, 0) - between(0, 1)) / 2}};
+  return {
+      {(between(2, 1) - between(1, 2)) / 2, (between(0, 2) - between(2, 0)) / 2, (between(1, 0) - between(0, 1)) / 2}};
 }
 
 struct Case {
@@ -188,8 +194,10 @@ std::vector<Case> cases() {
   std::vector<Case> out;
   for (const double scale : kScales)
     for (int k = 0; k < 20; ++k)
-      out.push_back({random.matrix<3>(0.15), {{random.uniform(0, 0.6), random.uniform(0, 0.6)}},
-                     random.uniform(0.3, 0.7) * std::numbers::pi, scale});
+      out.push_back({random.matrix<3>(0.15),
+                     {{random.uniform(0, 0.6), random.uniform(0, 0.6)}},
+                     random.uniform(0.3, 0.7) * std::numbers::pi,
+                     scale});
   return out;
 }
 
@@ -213,8 +221,8 @@ TEST_CASE("the slopes of a segment in space are those of its shape") {
   for (const Case& c : cases()) {
     const SegmentInputs inputs = segment_inputs(c.pulls, c.angle, c.scale);
     const InSpace at = in_space(c.control, inputs);
-    const auto compare = [&](const InSpace& more, const InSpace& less, double step, double objective, const Vec<3>& chord,
-                             const Vec<3>& turned, double unit) {
+    const auto compare = [&](const InSpace& more, const InSpace& less, double step, double objective,
+                             const Vec<3>& chord, const Vec<3>& turned, double unit) {
       CHECK(near(objective * unit, (more.objective - less.objective) / step * unit, 1));
       const Vec<3> moved = minus(more.chord, less.chord), around = turn(less.rotation, more.rotation);
       for (int k = 0; k < 3; ++k) {
@@ -234,8 +242,10 @@ TEST_CASE("the slopes of a segment in space are those of its shape") {
       Vec<2> up = c.pulls, down = c.pulls;
       up[k] += h;
       down[k] -= h;
-      compare(in_space(c.control, segment_inputs(up, c.angle, c.scale)), in_space(c.control, segment_inputs(down, c.angle, c.scale)),
-              2 * h * c.scale, at.objective_displacement_slope[k], column(at.chord_displacement_slope, k), column(at.turn_displacement_slope, k), c.scale);
+      compare(in_space(c.control, segment_inputs(up, c.angle, c.scale)),
+              in_space(c.control, segment_inputs(down, c.angle, c.scale)), 2 * h * c.scale,
+              at.objective_displacement_slope[k], column(at.chord_displacement_slope, k),
+              column(at.turn_displacement_slope, k), c.scale);
     }
   }
 }
@@ -252,7 +262,8 @@ TEST_CASE("the curvature of a segment in space is that of its work") {
       Vec<3> up = c.control, down = c.control;
       up[k] += h;
       down[k] -= h;
-      const Vec<3> more = slope(in_space(up, inputs), force, moment), less = slope(in_space(down, inputs), force, moment);
+      const Vec<3> more = slope(in_space(up, inputs), force, moment),
+                   less = slope(in_space(down, inputs), force, moment);
       for (int r = 0; r < 3; ++r) {  // a turn's second derivative is taken to be symmetric
         found(r, k) += (more[r] - less[r]) / (4 * h);
         found(k, r) += (more[r] - less[r]) / (4 * h);
@@ -296,7 +307,8 @@ TEST_CASE("wide registers change no bit" * doctest::skip(!__builtin_cpu_supports
 
     const SegmentInputs inputs = segment_inputs({{random.uniform(0, 0.6), random.uniform(0, 0.6)}}, 1.3, 1);
     Space narrow(n), broad(n);
-    Rows adjoints(SpatialLaw::kAdjoint, n), narrow_hessians(SpatialLaw::kHessian, n), broad_hessians(SpatialLaw::kHessian, n);
+    Rows adjoints(SpatialLaw::kAdjoint, n), narrow_hessians(SpatialLaw::kHessian, n),
+        broad_hessians(SpatialLaw::kHessian, n);
     for (int i = 0; i < n; ++i) {
       narrow.controls.put(i, random.matrix<3>(0.15).v.data(), 3);
       adjoints.put(i, random.matrix<6>().v.data(), 6);

@@ -2,9 +2,9 @@
 #include <doctest/doctest.h>
 
 #include "distance.hpp"
-#include "tolerances.hpp"
 #include "scenes.hpp"
 #include "solve/sweep.hpp"
+#include "tolerances.hpp"
 
 namespace ccr::testing {
 namespace {
@@ -21,11 +21,14 @@ Position<D> between(const Position<D>& a, const Position<D>& b, double part) {
 
 template <int D>
 Position<D> beside(Random& random, const Position<D>& place, double distance) {
-  return between(place, [&] {
-    Position<D> out = random.direction<D>();
-    out += place;
-    return out;
-  }(), distance);
+  return between(
+      place,
+      [&] {
+        Position<D> out = random.direction<D>();
+        out += place;
+        return out;
+      }(),
+      distance);
 }
 
 // By how much the straight pieces of an outline lie inside it.
@@ -116,7 +119,8 @@ void paths() {
       const Position<D> from = outside(random, obstacle, at, r);
       const Position<D> to = k % 3 == 0 ? close_to(random, obstacle, from, 2 * r) : outside(random, obstacle, at, r);
       const double deepest = deepest_of_path(obstacle, from, to);
-      if (deepest > 1.125 * allowed + sagitta(obstacle)) CHECK_FALSE(path_clear(obstacle, from, to));  // looked at every quarter of it
+      if (deepest > 1.125 * allowed + sagitta(obstacle))
+        CHECK_FALSE(path_clear(obstacle, from, to));  // looked at every quarter of it
       if (deepest < 0.7 * allowed && obstacle.outline.empty()) CHECK(path_clear(obstacle, from, to));
       ++(deepest > 1.125 * allowed ? barred : clear);
       const Position<D> next = close_to(random, obstacle, from, harmless_path(obstacle));
@@ -146,8 +150,10 @@ void edges() {
 
       const double harmless = harmless_motion(obstacle, longest);
       if (!(harmless > 0)) continue;
-      const Edge<D> next{close_to(random, obstacle, from.start, harmless), close_to(random, obstacle, from.end, harmless)};
-      if (norm(minus(next.end, next.start)) <= longest) CHECK(deepest_of_sweep(obstacle, from, next) <= half * (1 + 1e-9));
+      const Edge<D> next{close_to(random, obstacle, from.start, harmless),
+                         close_to(random, obstacle, from.end, harmless)};
+      if (norm(minus(next.end, next.start)) <= longest)
+        CHECK(deepest_of_sweep(obstacle, from, next) <= half * (1 + 1e-9));
     }
   });
   CHECK(clear > 200);
@@ -172,7 +178,8 @@ TEST_CASE("an edge sweeps over no core") {
 TEST_CASE("sharp corners are looked at as well as round ones") {
   const Robot robot = make_robot<2>({});
   for (const double edge : {1e-1, 1e-3, 1e-6, 1e-9, 1e-12}) {
-    const std::array numbers{edge, -10.0, -10.0, 10.0, -10.0, 10.0, 10.0, -10.0, 10.0, -10.0, 10.0, -10.0, 10.0, -10.0, 10.0, -10.0, 10.0};
+    const std::array numbers{edge,  -10.0, -10.0, 10.0, -10.0, 10.0, 10.0,  -10.0, 10.0,
+                             -10.0, 10.0,  -10.0, 10.0, -10.0, 10.0, -10.0, 10.0};
     const Obstacle<2> square = make_obstacle<2>(robot, Shape::kPolygon, numbers);
     CHECK_FALSE(path_clear<2>(square, {{-20, 0}}, {{20, 0}}));
     CHECK(path_clear<2>(square, {{-20, 12}}, {{20, 12}}));

@@ -20,8 +20,7 @@ class Riccati {
     Mat<NU, NU> huu;
   };
 
-  explicit Riccati(int segments)
-      : stages(segments), node_hessian(segments + 1), gain_(segments), factor_(segments) {}
+  explicit Riccati(int segments) : stages(segments), node_hessian(segments + 1), gain_(segments), factor_(segments) {}
 
   std::vector<Stage> stages;
   std::vector<Mat<NX, NX>> node_hessian;  // curvature in the state of each node

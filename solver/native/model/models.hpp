@@ -4,7 +4,7 @@
 #include "model/planar.hpp"
 #include "model/spatial.hpp"
 
-#define CCR_EACH_MODEL(DO)     \
+#define CCR_EACH_MODEL(DO)  \
   DO(ccr::Planar<PaperLaw>) \
-  DO(ccr::Planar<RodLaw>) \
+  DO(ccr::Planar<RodLaw>)   \
   DO(ccr::Spatial)

@@ -13,8 +13,8 @@ namespace ccr {
 
 namespace {
 
-// Calls `function` with the law of the obstacle's shape, and that of the gap alone, so that they are chosen once for many
-// points.
+// Calls `function` with the law of the obstacle's shape, and that of the gap alone, so that they are chosen once for
+// many points.
 template <class Function>
 void with_law(const Obstacle<2>& obstacle, Function function) {
   switch (obstacle.shape) {
@@ -80,9 +80,9 @@ double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> point
   return std::sqrt(square) - obstacle.radius;
 }
 
-#define CCR_INSTANTIATE(D)                                                                                            \
-  template Gap<D> measure_gap(const Obstacle<D>&, const Position<D>&);                                                \
-  template void measure_gaps(const Obstacle<D>&, std::span<const Position<D>>, const Position<D>&, double*);          \
+#define CCR_INSTANTIATE(D)                                                                                   \
+  template Gap<D> measure_gap(const Obstacle<D>&, const Position<D>&);                                       \
+  template void measure_gaps(const Obstacle<D>&, std::span<const Position<D>>, const Position<D>&, double*); \
   template double clearance(const Obstacle<D>&, std::span<const Position<D>>);
 CCR_INSTANTIATE(2)
 CCR_INSTANTIATE(3)

@@ -12,7 +12,17 @@ namespace ccr {
 
 // Those of the plane, those of space, and compiled ones.
 enum class Shape {
-  kCircle, kHalfPlane, kEllipse, kCapsule, kPolygon, kSphere, kHalfSpace, kSpatialCapsule, kCylinder, kBox, kCustom
+  kCircle,
+  kHalfPlane,
+  kEllipse,
+  kCapsule,
+  kPolygon,
+  kSphere,
+  kHalfSpace,
+  kSpatialCapsule,
+  kCylinder,
+  kBox,
+  kCustom
 };
 
 // A compiled gap law: (point, parameters) to a Gap.
@@ -24,16 +34,16 @@ template <int D>
 struct Obstacle {
   Shape shape;
   std::array<double, kShapeSize> parameters;  // as the gap law takes them
-  Law law;                               // of a custom shape
-  Position<D> center;                    // of a ball that holds it
-  double radius;                         // of that ball; infinite for a wall
-  double min_curvature_radius;                       // smallest radius of its surface; infinite for a wall
-  double inradius;                       // of the largest ball inside it; infinite for a wall
-  std::vector<Position<D>> outline;      // points of its surface, where its gap is no distance; else none
-  std::vector<unsigned char> touchable;  // (lines, positions): whether a point can touch it
-  bool everywhere;                       // whether all of them can
-  bool mounted;                          // on a spring; fixed otherwise
-  Mat<D, D> spring;                      // of its spring [N/mm]
+  Law law;                                    // of a custom shape
+  Position<D> center;                         // of a ball that holds it
+  double radius;                              // of that ball; infinite for a wall
+  double min_curvature_radius;                // smallest radius of its surface; infinite for a wall
+  double inradius;                            // of the largest ball inside it; infinite for a wall
+  std::vector<Position<D>> outline;           // points of its surface, where its gap is no distance; else none
+  std::vector<unsigned char> touchable;       // (lines, positions): whether a point can touch it
+  bool everywhere;                            // whether all of them can
+  bool mounted;                               // on a spring; fixed otherwise
+  Mat<D, D> spring;                           // of its spring [N/mm]
 
   bool wall() const { return shape == Shape::kHalfPlane || shape == Shape::kHalfSpace; }
 };
@@ -43,7 +53,7 @@ template <int D>
 struct Gap {
   double value;
   Position<D> slope;
-  std::array<double, D * (D + 1) / 2> upper;  // of the symmetric second derivative, row by row
+  std::array<double, (D * D + D) / 2> upper;  // of the symmetric second derivative, row by row
 
   Mat<D, D> curvature(double scale) const {
     Mat<D, D> out;

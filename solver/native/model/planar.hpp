@@ -38,7 +38,7 @@ template <class Cable>
 class Planar {
  public:
   static constexpr int kSpace = 2, kTurn = 1, kControl = 1, kCables = 1;
-  static constexpr int kShears = 1;  // leading controls, the softest
+  static constexpr int kShears = 1;             // leading controls, the softest
   static constexpr int kState = Cable::kState;  // x, y, disk angle, and with a sliding cable what is taken from it
   static constexpr bool kRod = Cable::kRod;
   static constexpr int kTip = 3;  // slopes of the free tip in the cable: x, y, angle
@@ -57,13 +57,15 @@ class Planar {
   // Shape under a command; false when a coordinate leaves the range of the segment law.
   bool evaluate(const Command<1>& command, const std::vector<Control>& controls);
 
-  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each node.
+  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each
+  // node.
   void adjoin(const std::vector<State>& node_forces);
   // Both follow adjoin.
   void curvature(System& system) const;
   Vec<1> displacement_slopes() const;  // of the Lagrangian in the cable displacement
 
-  // The control of every segment of the robot that nothing touches, and with a sliding cable the multiplier of its slack.
+  // The control of every segment of the robot that nothing touches, and with a sliding cable the multiplier of its
+  // slack.
   Control free_control(const Command<1>& command);
   double free_slack_multiplier() const requires(kRod) { return 2 * free_control_[0] / free_bend_[0].taken_slope; }
   Vec<kTip> free_slopes(const Command<1>& command);
@@ -79,7 +81,7 @@ class Planar {
   std::vector<Control> gradient;
   double objective = 0;
   double max_objective_slope = 0;  // largest slope of the objective alone
-  double widest = 0;    // largest angle between consecutive disks
+  double widest = 0;               // largest angle between consecutive disks
 
  private:
   Robot robot_;

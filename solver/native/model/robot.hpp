@@ -13,15 +13,15 @@ enum class ModelKind { kPaper, kRod, kSpatial };
 struct Robot {
   ModelKind model;
   int segments;
-  double offset;       // cables from backbone [mm]
-  double angle;        // from the first cable to the second [rad]
-  double rigidity;     // EI [N mm^2]
-  double max_tension;  // [N]
-  double max_length;   // of the backbone, what places are measured by [mm]
+  double offset;                       // cables from backbone [mm]
+  double angle;                        // from the first cable to the second [rad]
+  double rigidity;                     // EI [N mm^2]
+  double max_tension;                  // [N]
+  double max_length;                   // of the backbone, what places are measured by [mm]
   double disk_radius, disk_thickness;  // of the disks that meet where a segment bends far [mm]
-  std::vector<Vec<2>> lines;  // place on the disk of each line of points that can touch [mm]
-  std::vector<double> edges;  // the longest edge between neighbouring points of each line [mm]
-  int between;                // points of a line between two nodes
+  std::vector<Vec<2>> lines;           // place on the disk of each line of points that can touch [mm]
+  std::vector<double> edges;           // the longest edge between neighbouring points of each line [mm]
+  int between;                         // points of a line between two nodes
 
   int positions() const { return segments * (between + 1) + 1; }  // of a line
   int points() const { return static_cast<int>(lines.size()) * positions(); }

@@ -8,7 +8,8 @@ namespace avx2 {
 void bend(int n, const double* sines, double displacement, double length, double offset, PaperLaw::Bends& bends);
 void bend(int n, const double* angles, double length, double offset, RodLaw::Bends& bends);
 bool bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends);
-void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings, const Rows& adjoints, Rows& hessians);
+void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
+                         const Rows& adjoints, Rows& hessians);
 }  // namespace avx2
 
 namespace {
@@ -37,7 +38,8 @@ bool SpatialLaw::bend(int n, const SegmentInputs& inputs, const Rows& controls, 
   return baseline::bend(n, inputs, controls, bendings, bends);
 }
 
-void SpatialLaw::hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings, const Rows& adjoints, Rows& hessians) {
+void SpatialLaw::hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
+                                     const Rows& adjoints, Rows& hessians) {
 #ifdef CCR_AVX2
   if (has_avx2) return avx2::hessian_contraction(n, inputs, controls, bendings, adjoints, hessians);
 #endif

@@ -37,7 +37,7 @@ class Table : public Rows {
   explicit Table(int segments) : Rows(kLaws + 2, segments) {}
 
   Bend operator[](int i) const {
-    return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i), at(5, i),
+    return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i),  at(5, i),
             at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
   }
   void place(int segment, double dx, double dy) {
@@ -53,11 +53,11 @@ struct PaperLaw {
   static constexpr bool kRod = false;
 
   struct Bend {
-    double angle, slope, curvature, displacement_slope;   // θ, θ_σ, θ_σσ, θ_pull
-    double forward, sideways;                     // backbone segment from the lower disk's y axis, over its length
-    double heading_slope, heading_curvature;      // of its direction
-    double cosine, sine;                          // of θ
-    double dx, dy;                                // backbone segment in the base frame
+    double angle, slope, curvature, displacement_slope;  // θ, θ_σ, θ_σσ, θ_pull
+    double forward, sideways;                 // backbone segment from the lower disk's y axis, over its length
+    double heading_slope, heading_curvature;  // of its direction
+    double cosine, sine;                      // of θ
+    double dx, dy;                            // backbone segment in the base frame
   };
 
   using Bends = Table<Bend>;
@@ -66,19 +66,19 @@ struct PaperLaw {
   static void bend(int n, const double* sines, double displacement, double length, double offset, Bends& bends);
 };
 
-// The cable slides through all disks (Rao 2024). A segment is an arc, its coordinate the angle θ between its disks; what
-// the segments take from the cable is summed up in the state, and may not be less than is pulled.
+// The cable slides through all disks (Rao 2024). A segment is an arc, its coordinate the angle θ between its disks;
+// what the segments take from the cable is summed up in the state, and may not be less than is pulled.
 struct RodLaw {
   static constexpr int kState = 4;  // x, y, disk angle, cable taken
   static constexpr bool kRod = true;
 
   struct Bend {
-    double angle;                                 // θ
-    double forward, sideways;                     // chord from the lower disk's y axis, over the segment's length
-    double stretch, stretch_slope;                // c'/c and c''/c of its length
-    double cosine, sine;                          // of θ
-    double taken, taken_slope, taken_curvature;   // from the cable
-    double dx, dy;                                // chord in the base frame
+    double angle;                                // θ
+    double forward, sideways;                    // chord from the lower disk's y axis, over the segment's length
+    double stretch, stretch_slope;               // c'/c and c''/c of its length
+    double cosine, sine;                         // of θ
+    double taken, taken_slope, taken_curvature;  // from the cable
+    double dx, dy;                               // chord in the base frame
     static constexpr double slope = 1, curvature = 0, heading_slope = -0.5, heading_curvature = 0;
   };
 
@@ -94,8 +94,8 @@ struct SegmentInputs {
   double holes[4];          // where the pulled cables pass the disk: x, y of each [mm]
 };
 
-// Two cables in space, each shared equally among the segments. The controls of a segment are its shears and its twist; the
-// lengths of the cables give its bending.
+// Two cables in space, each shared equally among the segments. The controls of a segment are its shears and its twist;
+// the lengths of the cables give its bending.
 struct SpatialLaw {
   static constexpr int kControl = 3, kBending = 2, kBend = 48, kAdjoint = 6, kHessian = 9;
 
@@ -103,7 +103,8 @@ struct SpatialLaw {
   static bool bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends);
 
   // The curvatures of n segments seen by adjoints, what the law `ccr_bow` says.
-  static void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings, const Rows& adjoints, Rows& hessians);
+  static void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
+                                  const Rows& adjoints, Rows& hessians);
 };
 
 }  // namespace ccr

@@ -46,7 +46,8 @@ bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& co
     for (int k = 0; k < 3; ++k) states[i + 1][k] += chord[k];
     frames[i + 1] = times(frames[i], bend.rotation);
     objective += bend.objective;
-    for (const double slope : bend.objective_slope.v) max_objective_slope = std::max(max_objective_slope, std::abs(slope));
+    for (const double slope : bend.objective_slope.v)
+      max_objective_slope = std::max(max_objective_slope, std::abs(slope));
   }
   return std::isfinite(objective);
 }
@@ -118,7 +119,8 @@ double Spatial::free_turn() const {
 // segment i stands at the angle (i + 1/2) θ in the plane of t.
 Vec<10> Spatial::free_slopes(const Command<2>& command) const {
   const int n = robot_.segments;
-  const double a = robot_.offset, length = command.length / n, cosine = std::cos(robot_.angle), sine = std::sin(robot_.angle);
+  const double a = robot_.offset, length = command.length / n, cosine = std::cos(robot_.angle),
+               sine = std::sin(robot_.angle);
   // Slopes of t in each displacement, the same in all segments.
   const double slopes[2][2] = {{1 / (n * a), -cosine / (n * a * sine)}, {0, 1 / (n * a * sine)}};
   Vec<2> towards;

@@ -65,7 +65,8 @@ class Spatial {
   // Shape under a command; false where the cables cannot have their lengths.
   bool evaluate(const Command<2>& command, const std::vector<Control>& controls);
 
-  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each node.
+  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each
+  // node.
   void adjoin(const std::vector<State>& node_forces);
   // Both follow adjoin.
   void curvature(System& system) const;
@@ -74,7 +75,7 @@ class Spatial {
   Vec<kTip> free_slopes(const Command<2>& command) const;
 
   double widest_shear() const { return 1; }  // sine of it
-  double free_turn() const;  // of a segment that nothing touches, about
+  double free_turn() const;                  // of a segment that nothing touches, about
   double segment_length() const { return inputs_.length; }
 
   std::vector<State> states;

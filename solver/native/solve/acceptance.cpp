@@ -44,15 +44,15 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   const bool pulled = pulls_cable(command) && command.length == present_.command.length;
   const bool rising = pulled || (!only_releases(command) && tension > highest(tensions_));
   if (rising && tension > limit) return Move::kOverTension;
-  // The tension may exceed the limit in between and fall again. Work of the cables beyond that of a linear tension bounds
-  // the mean excess over the straight line; the peak is at most twice the mean.
+  // The tension may exceed the limit in between and fall again. Work of the cables beyond that of a linear tension
+  // bounds the mean excess over the straight line; the peak is at most twice the mean.
   const double hump = std::max(0.0, -loss) * 2 * problem_.energy_scale() / (distance * problem_.robot().offset);
   const bool peaks = pulled && std::max(tension, highest(tensions_)) + hump > limit;
   return peaks && distance > kPeakStep ? Move::kRejected : Move::kAccepted;
 }
 
-// Whether a contact came in with an obstacle that is narrower than the distance of neighbouring points: which point meets
-// it first decides where the robot goes.
+// Whether a contact came in with an obstacle that is narrower than the distance of neighbouring points: which point
+// meets it first decides where the robot goes.
 template <class Model>
 bool ModelContinuation<Model>::meets_narrow_obstacle() const {
   const std::vector<double>& edges = problem_.robot().edges;
@@ -76,8 +76,8 @@ double ModelContinuation<Model>::energy_loss(const Command& command) const {
   return work / problem_.energy_scale() - (problem_.energy() - energy_);
 }
 
-// Whether the robot came to `trial_` by a jump, and not along its branch: its motion is off the trend, energy was lost, and
-// the way back does not return to `present_`.
+// Whether the robot came to `trial_` by a jump, and not along its branch: its motion is off the trend, energy was lost,
+// and the way back does not return to `present_`.
 template <class Model>
 bool ModelContinuation<Model>::left_branch(const Command& command, double moved, double loss) {
   if (moved <= kStill * problem_.robot().max_length) return false;
@@ -87,8 +87,9 @@ bool ModelContinuation<Model>::left_branch(const Command& command, double moved,
   if (command.length == present_.command.length) {
     double unevenness = 0;  // work that a tension which does not change linearly may add or take
     for (int k = 0; k < kCables; ++k)
-      unevenness += std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
-                    (kUneven * std::abs(trial_tensions_[k] - tensions_[k]) + kLost * std::max(tensions_[k], trial_tensions_[k]));
+      unevenness +=
+          std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
+          (kUneven * std::abs(trial_tensions_[k] - tensions_[k]) + kLost * std::max(tensions_[k], trial_tensions_[k]));
     if (std::abs(loss) * problem_.energy_scale() <= unevenness) return false;
   }
   return !way_back_returns();
@@ -125,7 +126,7 @@ bool ModelContinuation<Model>::way_back_returns() {
   return apart <= kReturned * moved;
 }
 
-#define CCR_INSTANTIATE(Model)                                                                                          \
+#define CCR_INSTANTIATE(Model) \
   template ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

@@ -13,10 +13,14 @@ using namespace tolerances;
 
 template <class Model>
 ActiveSetQp<Model>::ActiveSetQp(int segments, int mounts)
-    : slopes_(kMaxActive), penalties_(kMaxActive), responses_(kMaxActive, Direction(segments, mounts)), loads_(kMaxActive + 1) {}
+    : slopes_(kMaxActive),
+      penalties_(kMaxActive),
+      responses_(kMaxActive, Direction(segments, mounts)),
+      loads_(kMaxActive + 1) {}
 
 template <class Model>
-ActiveSetQp<Model>::Load ActiveSetQp<Model>::linearize_gap(const ContactProblem& problem, int contact, int j, double penalty) {
+ActiveSetQp<Model>::Load ActiveSetQp<Model>::linearize_gap(const ContactProblem& problem, int contact, int j,
+                                                           double penalty) {
   slopes_[j] = problem.slope(contact);
   penalties_[j] = penalty;
   return {&slopes_[j], &responses_[j]};
@@ -24,7 +28,8 @@ ActiveSetQp<Model>::Load ActiveSetQp<Model>::linearize_gap(const ContactProblem&
 
 // What the penalty on the active gaps adds to a step while they are not closed.
 template <class Model>
-void ActiveSetQp<Model>::add_penalty_response(const ContactProblem& problem, const ActiveSet& active, Direction& step) const {
+void ActiveSetQp<Model>::add_penalty_response(const ContactProblem& problem, const ActiveSet& active,
+                                              Direction& step) const {
   for (int j = 0; j < active.count; ++j)
     if (penalties_[j] != 0) step.add(-penalties_[j] * problem.gaps()[active.contact[j]], responses_[j]);
 }
@@ -66,10 +71,11 @@ void ActiveSetQp<Model>::solve_gram(int count, Column& x) const {
 
 // Change of the multipliers that closes the active gaps.
 template <class Model>
-ActiveSetQp<Model>::Column ActiveSetQp<Model>::closing_multipliers(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const {
+ActiveSetQp<Model>::Column ActiveSetQp<Model>::closing_multipliers(const ContactProblem& problem,
+                                                                   const ActiveSet& active,
+                                                                   const Direction& step) const {
   Column change;
-  for (int j = 0; j < active.count; ++j)
-    change[j] = -problem.gaps()[active.contact[j]] - along(j, step);
+  for (int j = 0; j < active.count; ++j) change[j] = -problem.gaps()[active.contact[j]] - along(j, step);
   solve_gram(active.count, change);
   return change;
 }
@@ -107,7 +113,8 @@ void ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem
 
 // Adds a violated gap by dual steps: its multiplier grows until it is closed, releasing whatever turns negative.
 template <class Model>
-bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active, Direction& step) {
+bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active,
+                                          Direction& step) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   if (active.count == kMaxActive) return false;
   const Load newcomer = linearize_gap(problem, contact, active.count, 0);
@@ -153,7 +160,8 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
 }
 
 template <class Model>
-int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const {
+int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const ActiveSet& active,
+                                      const Direction& step) const {
   double reach = 0;  // of any point under the step
   for (const auto& d : step.states) {
     double motion = 0, turn = 0;
@@ -184,7 +192,8 @@ int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const Activ
 }
 
 template <class Model>
-bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
+bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active,
+                                      Direction& step) {
   drop_negative_multipliers(problem, active, step);
   for (int change = 0; change < kActiveSetChanges; ++change) {
     const int contact = most_violated(problem, active, step);

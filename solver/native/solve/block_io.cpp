@@ -70,10 +70,12 @@ void ModelContinuation<Model>::read_active_set(const double* block) {
   const double *flags = block + layout_.flags.offset, *multipliers = block + layout_.multipliers.offset;
   if (std::find(flags, flags + points, 1.0) != flags + points)
     for (int c = 0; c < problem_.contacts(); ++c)
-      if (flags[c % points] != 0 && multipliers[c] > 0 && active.count < kMaxActive) add_contact(active, c, multipliers[c]);
+      if (flags[c % points] != 0 && multipliers[c] > 0 && active.count < kMaxActive)
+        add_contact(active, c, multipliers[c]);
   if (!Model::kRod) return;
   if (tensions_[0] > 0)
-    add_contact(active, problem_.slack_contact(), tensions_[0] / problem_.robot().energy_scale(present_.command.length));
+    add_contact(active, problem_.slack_contact(),
+                tensions_[0] / problem_.robot().energy_scale(present_.command.length));
   const double* disks = block + layout_.disk_multipliers.offset;
   for (int i = 0; i < problem_.robot().segments; ++i)
     if (disks[i] != 0) add_contact(active, problem_.first_disk_contact() + 2 * i + (disks[i] < 0), std::abs(disks[i]));
@@ -162,8 +164,8 @@ void ModelContinuation<Model>::write_mounts(const std::vector<Position>& mounts,
     displacements = write(problem_.mount_of(j) < 0 ? Position{}.v : mounts[problem_.mount_of(j)].v, displacements);
 }
 
-#define CCR_INSTANTIATE(Model)                                           \
-  template void ModelContinuation<Model>::read_block(const double*);     \
+#define CCR_INSTANTIATE(Model)                                       \
+  template void ModelContinuation<Model>::read_block(const double*); \
   template void ModelContinuation<Model>::write_block(double*);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

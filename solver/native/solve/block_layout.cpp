@@ -61,8 +61,26 @@ BlockLayout make_block_layout(ModelKind model, const BlockCounts& counts) {
 }
 
 std::vector<BlockField> BlockLayout::fields() const {
-  return {cables, length, tensions, objective, coordinates, nodes, frames, multipliers, gaps, displacements, forces, force,
-          clearance, onset, tip_slopes, flags, disk_multipliers, trend_coordinates, trend_displacements, trend_multipliers};
+  return {cables,
+          length,
+          tensions,
+          objective,
+          coordinates,
+          nodes,
+          frames,
+          multipliers,
+          gaps,
+          displacements,
+          forces,
+          force,
+          clearance,
+          onset,
+          tip_slopes,
+          flags,
+          disk_multipliers,
+          trend_coordinates,
+          trend_displacements,
+          trend_multipliers};
 }
 
 #define CCR_INSTANTIATE(Model) template BlockLayout make_block_layout<Model>(const BlockCounts&);

@@ -23,22 +23,22 @@ struct BlockCounts {
 };
 
 struct BlockLayout {
-  BlockField cables{"cables"};            // displacements [mm]
-  BlockField length{"length"};            // of the backbone [mm]
-  BlockField tensions{"tensions"};        // [N]
-  BlockField objective{"objective"};      // of the robot alone, over the energy scale [rad²]
-  BlockField coordinates{"coordinates"};  // controls of each segment
-  BlockField nodes{"nodes"};              // x, y, angle of each node in the plane; x, y, z in space [mm, rad]
-  BlockField frames{"frames"};            // of each node: the direction of the cable, in space a rotation matrix
-  BlockField multipliers{"multipliers"};  // of each contact, over the energy scale
-  BlockField gaps{"gaps"};                // of each contact, infinite where the point cannot touch [mm]
+  BlockField cables{"cables"};                // displacements [mm]
+  BlockField length{"length"};                // of the backbone [mm]
+  BlockField tensions{"tensions"};            // [N]
+  BlockField objective{"objective"};          // of the robot alone, over the energy scale [rad²]
+  BlockField coordinates{"coordinates"};      // controls of each segment
+  BlockField nodes{"nodes"};                  // x, y, angle of each node in the plane; x, y, z in space [mm, rad]
+  BlockField frames{"frames"};                // of each node: the direction of the cable, in space a rotation matrix
+  BlockField multipliers{"multipliers"};      // of each contact, over the energy scale
+  BlockField gaps{"gaps"};                    // of each contact, infinite where the point cannot touch [mm]
   BlockField displacements{"displacements"};  // of each obstacle [mm]
-  BlockField forces{"forces"};            // of each obstacle on the robot [N]
-  BlockField force{"force"};              // of all obstacles together [N]
-  BlockField clearance{"clearance"};      // smallest gap [mm]
-  BlockField onset{"onset"};              // tensions where the present contact began, signed as the displacements; else 0 [N]
-  BlockField tip_slopes{"tip_slopes"};    // of the free tip in each displacement
-  BlockField flags{"flags"};              // 1 for each point in the active set, else 0
+  BlockField forces{"forces"};                // of each obstacle on the robot [N]
+  BlockField force{"force"};                  // of all obstacles together [N]
+  BlockField clearance{"clearance"};          // smallest gap [mm]
+  BlockField onset{"onset"};  // tensions where the present contact began, signed as the displacements; else 0 [N]
+  BlockField tip_slopes{"tip_slopes"};  // of the free tip in each displacement
+  BlockField flags{"flags"};            // 1 for each point in the active set, else 0
   // Rod model: multipliers of disks that meet, signed as the angle between them.
   BlockField disk_multipliers{"disk_multipliers"};
   // One cable: change of the equilibrium per millimetre of displacement, from which the next step starts.

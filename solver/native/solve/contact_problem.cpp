@@ -9,26 +9,6 @@
 namespace ccr {
 
 template <class Model>
-void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> nodes,
-                  std::span<const typename Model::Frame> frames, std::vector<Position<Model::kSpace>>& points) {
-  const int stride = robot.between + 1;
-  auto* point = points.data();
-  for (const Vec<2>& line : robot.lines) {
-    for (int i = 0; i <= robot.segments; ++i) {
-      point[i * stride] = nodes[i];
-      point[i * stride] += Model::lever(frames[i], line);
-    }
-    for (int i = 0; i < robot.segments; ++i)
-      for (int k = 1; k < stride; ++k) {
-        const auto &here = point[i * stride], &next = point[(i + 1) * stride];
-        const double t = static_cast<double>(k) / stride;
-        for (int c = 0; c < Model::kSpace; ++c) point[i * stride + k][c] = here[c] + t * (next[c] - here[c]);
-      }
-    point += robot.positions();
-  }
-}
-
-template <class Model>
 ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
     : robot_(robot),
       model_(robot),
@@ -36,7 +16,8 @@ ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
       clear_(obstacles),
       nodes_(robot.segments + 1),
       points_(robot.points()),
-      gaps_(obstacles * points_.size() + Model::kRod * (1 + 2 * robot.segments), std::numeric_limits<double>::infinity()),
+      gaps_(obstacles * points_.size() + Model::kRod * (1 + 2 * robot.segments),
+            std::numeric_limits<double>::infinity()),
       mount_of_(obstacles, -1),
       node_forces_(robot.segments + 1) {
   near_.reserve(gaps_.size());
@@ -60,23 +41,6 @@ void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
   mount_origin_.resize(mounts);
   displacements_.resize(mounts);
   mount_gradient_.resize(mounts);
-}
-
-template <class Model>
-void ContactProblem<Model>::update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts) {
-  std::copy(nodes.begin(), nodes.end(), origin_.begin());
-  mount_origin_ = mounts;
-  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
-    clear_[j] = clearance(obstacles_[j], nodes) - reach_;
-    if (mount_of_[j] >= 0) clear_[j] -= norm(mounts[mount_of_[j]]);
-  }
-}
-
-template <class Model>
-bool ContactProblem<Model>::out_of_reach(int obstacle, double motion) const {
-  const int mount = mount_of_[obstacle];
-  if (mount >= 0) motion += norm(minus(displacements_[mount], mount_origin_[mount]));
-  return clear_[obstacle] > drift_ + motion;
 }
 
 template <class Model>
@@ -109,7 +73,8 @@ void ContactProblem<Model>::raise_fence(const std::vector<Control>& controls) {
     for (int r = 0; r < Model::kShears; ++r) {
       fence_slope_[i][r] = rise * excess * controls[i][r];
       fence_curvature_[i](r, r) = rise * excess;
-      for (int c = 0; c < Model::kShears; ++c) fence_curvature_[i](r, c) += 2 * rise / square * controls[i][r] * controls[i][c];
+      for (int c = 0; c < Model::kShears; ++c)
+        fence_curvature_[i](r, c) += 2 * rise / square * controls[i][r] * controls[i][c];
     }
   }
   energy_ += fence_energy_;
@@ -146,66 +111,6 @@ void ContactProblem<Model>::set_free_shape(Iterate& at) {
       at.active.count = 1;
     }
   std::fill(at.controls.begin(), at.controls.end(), control);
-}
-
-// Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
-template <class Model>
-void ContactProblem<Model>::measure_gaps() {
-  const int n = robot_.segments, stride = robot_.between + 1;
-  for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
-  near_.clear();
-  double drift = 0;
-  for (int i = 0; i <= n; ++i) {
-    const Position motion = minus(nodes_[i], origin_[i]);
-    drift = std::max(drift, dot(motion, motion));
-  }
-  drift_ = std::sqrt(drift);
-  for (int j = 0; j < static_cast<int>(obstacles_.size()); ++j) {
-    if (out_of_reach(j, 0)) continue;
-    const Obstacle& obstacle = obstacles_[j];
-    const Position moved = this->displacement(j);
-    const int first = j * robot_.points();
-    for (int i = 0; i <= n; ++i) {
-      const double distance = clearance_beyond(obstacle, minus(nodes_[i], moved), reach_);
-      if (distance > 0) {
-        i += static_cast<int>(std::min(distance / model_.segment_length(), static_cast<double>(n)));
-        continue;
-      }
-      for (int start = i * stride; start < robot_.points(); start += robot_.positions())
-        for (int k = start; k < start + (i < n ? stride : 1); ++k) {
-          if (!obstacle.touchable[k]) continue;
-          ccr::measure_gaps(obstacle, std::span<const Position>(&points_[k], 1), moved, &gaps_[first + k]);
-          near_.push_back(first + k);
-        }
-    }
-  }
-}
-
-template <class Model>
-void ContactProblem<Model>::measure_slack_and_disks(const Command& command) requires(Model::kRod) {
-  const auto add = [this](int contact, double gap) {
-    gaps_[contact] = gap;
-    near_.push_back(contact);
-  };
-  add(slack_contact(), model_.slack(command));
-  const double close = tolerances::kDisksClose * (model_.segment_length() - robot_.disk_thickness) / robot_.disk_radius;
-  if (model_.widest <= close) return;
-  for (int i = 0; i < robot_.segments; ++i) {
-    const double angle = states()[i][2] - states()[i + 1][2];
-    if (std::abs(angle) <= close) continue;
-    const int contact = first_disk_contact() + 2 * i + (angle < 0);
-    add(contact, disk_gap(contact).value);
-  }
-}
-
-template <class Model>
-void ContactProblem<Model>::all_gaps(double* gaps) const {
-  for (std::size_t j = 0; j < obstacles_.size(); ++j) {
-    ccr::measure_gaps(obstacles_[j], std::span<const Position>(points_), displacement(static_cast<int>(j)), gaps);
-    for (std::size_t k = 0; k < points_.size() && !obstacles_[j].everywhere; ++k)
-      if (!obstacles_[j].touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
-    gaps += points_.size();
-  }
 }
 
 template <class Model>
@@ -382,10 +287,7 @@ ContactProblem<Model>::Position ContactProblem<Model>::mount_load(const ActiveSe
   return load;
 }
 
-#define CCR_INSTANTIATE(Model)                                                                                   \
-  template class ContactProblem<Model>;                                                                                   \
-  template void place_points<Model>(const Robot&, std::span<const Position<Model::kSpace>>,                      \
-                                    std::span<const Model::Frame>, std::vector<Position<Model::kSpace>>&);
+#define CCR_INSTANTIATE(Model) template class ContactProblem<Model>;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

@@ -5,15 +5,16 @@
 #include <span>
 #include <vector>
 
-#include "tolerances.hpp"
 #include "math/linalg.hpp"
 #include "model/obstacle.hpp"
 #include "model/robot.hpp"
+#include "tolerances.hpp"
 
 namespace ccr {
 
-// ActiveSetQp that carry a multiplier. A contact is (obstacle * lines + line) * positions + position. After the last of these
-// come, with a sliding cable, its slack, and of each segment where its disks meet on the side of the cable and opposite.
+// ActiveSetQp that carry a multiplier. A contact is (obstacle * lines + line) * positions + position. After the last of
+// these come, with a sliding cable, its slack, and of each segment where its disks meet on the side of the cable and
+// opposite.
 struct ActiveSet {
   int count = 0;
   std::array<int, tolerances::kMaxActive> contact;
@@ -96,7 +97,7 @@ class ContactProblem {
   void lagrangian_hessian(const ActiveSet& active, System& system) const;
   Tensions tensions(const ActiveSet& active) const;
   Position contact_force(const ActiveSet& active, int obstacle) const;  // its force on the robot [N]
-  Position mount_load(const ActiveSet& active, int mount) const;  // Σ λ ∇c of the contacts on a mount
+  Position mount_load(const ActiveSet& active, int mount) const;        // Σ λ ∇c of the contacts on a mount
 
   // Slopes of the tip of a robot that nothing touches in the cable displacements (eq. 7).
   auto free_slopes(const Command& command) { return model_.free_slopes(command); }
@@ -110,8 +111,8 @@ class ContactProblem {
   double objective() const { return model_.objective; }
   double energy() const { return energy_; }  // the objective and that of the springs, over the energy scale [rad^2]
   double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the energy scale [rad^2]
-  double violation() const;  // largest -gap, at least 0
-  double tolerance(const ActiveSet& active) const;  // of the slope of the Lagrangian
+  double violation() const;                                                        // largest -gap, at least 0
+  double tolerance(const ActiveSet& active) const;                                 // of the slope of the Lagrangian
   double energy_scale() const { return robot_.energy_scale(model_.segment_length() * robot_.segments); }
   const std::vector<State>& states() const { return model_.states; }
   const std::vector<Frame>& frames() const { return model_.frames; }
@@ -119,10 +120,10 @@ class ContactProblem {
   // ActiveSetQp within reach, and the gap of every contact, infinite for those that are not.
   const std::vector<int>& near_contacts() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
-  bool out_of_reach(int obstacle, double motion) const;  // from any point, even after such a motion
-  void all_gaps(double* gaps) const;  // of every contact, whether within reach or not
-  Gap<kSpace> gap(int contact) const;                         // with its derivatives in the point
-  Force force(int contact, const Position& on_point) const;   // on the nodes, of one on the point
+  bool out_of_reach(int obstacle, double motion) const;      // from any point, even after such a motion
+  void all_gaps(double* gaps) const;                         // of every contact, whether within reach or not
+  Gap<kSpace> gap(int contact) const;                        // with its derivatives in the point
+  Force force(int contact, const Position& on_point) const;  // on the nodes, of one on the point
   Slope slope(int contact) const;
   int mounts() const { return static_cast<int>(springs_.size()); }
   int mount(int contact) const { return contact >= contacts() ? -1 : mount_of_[contact / points_.size()]; }
@@ -146,7 +147,9 @@ class ContactProblem {
   Position point(int contact) const;  // in the frame of the mount
   const Site& site(int contact) const { return sites_[contact % points_.size()]; }
   Position lever(const Site& site, int node) const { return Model::lever(model_.frames[node], site.line); }
-  Position displacement(int obstacle) const { return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]]; }
+  Position displacement(int obstacle) const {
+    return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]];
+  }
   void add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod);
   void raise_fence(const std::vector<Control>& controls);
   void update_springs(const std::vector<Position>& mounts);
@@ -163,22 +166,22 @@ class ContactProblem {
   double energy_ = 0;
   bool fenced_ = false;
   double fence_energy_ = 0;
-  std::vector<Control> fence_slope_;                                          // (segments), while fenced
+  std::vector<Control> fence_slope_;  // (segments), while fenced
   std::vector<Mat<Model::kControl, Model::kControl>> fence_curvature_;
-  std::vector<Position> origin_;  // nodes of the shape looked around from
+  std::vector<Position> origin_;        // nodes of the shape looked around from
   std::vector<Position> mount_origin_;  // mounts of that shape
-  std::vector<double> clear_;     // how far its nodes may move before an obstacle is within reach
-  double drift_ = 0;              // how far they have
+  std::vector<double> clear_;           // how far its nodes may move before an obstacle is within reach
+  double drift_ = 0;                    // how far they have
   std::vector<Position> nodes_;
   std::vector<Position> points_;
   std::vector<Site> sites_;  // of the points
   std::vector<double> gaps_;
   std::vector<int> near_;
-  std::vector<int> mount_of_;                      // obstacle, -1 for a fixed one
-  std::vector<Mat<kSpace, kSpace>> springs_;       // of the mounts
-  std::vector<Position> displacements_;            // of the mounts
+  std::vector<int> mount_of_;                 // obstacle, -1 for a fixed one
+  std::vector<Mat<kSpace, kSpace>> springs_;  // of the mounts
+  std::vector<Position> displacements_;       // of the mounts
   std::vector<Position> mount_gradient_;
-  std::vector<State> node_forces_;     // Σ λ ∇c at each node
+  std::vector<State> node_forces_;  // Σ λ ∇c at each node
 };
 
 }  // namespace ccr

@@ -21,8 +21,8 @@ struct Ramp {
   double length;            // of the backbone [mm]
 };
 
-// The continuation of one robot in the plane or in space, for scenes of a fixed number of obstacles. Holds scratch memory
-// and no state between calls: an equilibrium is a block of numbers, laid out as `layout` says.
+// The continuation of one robot in the plane or in space, for scenes of a fixed number of obstacles. Holds scratch
+// memory and no state between calls: an equilibrium is a block of numbers, laid out as `layout` says.
 template <int D>
 class Continuation {
  public:
@@ -33,19 +33,20 @@ class Continuation {
   // Switches to another scene with the same number of obstacles. The span must outlive its use.
   virtual void set_obstacles(std::span<const Obstacle<D>> obstacles) = 0;
 
-  // Takes the robot from the equilibrium in one block towards the command `target`, cables and length evenly, and writes
-  // the equilibrium reached to another block, which may be the same.
+  // Takes the robot from the equilibrium in one block towards the command `target`, cables and length evenly, and
+  // writes the equilibrium reached to another block, which may be the same.
   virtual StepResult follow(const double* from, const double* target, double* to) = 0;
 
-  // The same, appending every accepted shape to `shapes`: three numbers of each node, the points that can touch, and the
-  // displacements of the obstacles.
+  // The same, appending every accepted shape to `shapes`: three numbers of each node, the points that can touch, and
+  // the displacements of the obstacles.
   virtual StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) = 0;
 
   // Returns whether a ramp gets to its contact force without an event on the way; false as well where the robot at rest
   // overlaps an obstacle. Writes the last force to `reached`.
   virtual bool ramp_reaches_force(const Ramp& ramp, double* reached) = 0;
 
-  // Returns how well the equilibrium in a block meets its KKT conditions, evaluated anew from coordinates and multipliers.
+  // Returns how well the equilibrium in a block meets its KKT conditions, evaluated anew from coordinates and
+  // multipliers.
   virtual Optimality optimality(const double* block) = 0;
 };
 

@@ -9,8 +9,8 @@ namespace ccr {
 
 using namespace tolerances;
 
-// Descends from `present_`, whose branch ends within the smallest step, to a stable equilibrium under a command part of the
-// way to this one; back to `present_` where there is none, or where the motor would have to hold too much.
+// Descends from `present_`, whose branch ends within the smallest step, to a stable equilibrium under a command part of
+// the way to this one; back to `present_` where there is none, or where the motor would have to hold too much.
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command) {
   const bool motor_holds = !only_releases(command);
@@ -82,7 +82,8 @@ bool ModelContinuation<Model>::restore_at(const Command& command, bool holding) 
   return newton_.restore(trial_) && trial_is_close();
 }
 
-// One iterate of the descent from `present_` to `trial_`, shortened until nothing is jumped over. True at an equilibrium.
+// One iterate of the descent from `present_` to `trial_`, shortened until nothing is jumped over. True at an
+// equilibrium.
 template <class Model>
 bool ModelContinuation<Model>::descend_once(bool& moved) {
   double cap = kDescentCap;

@@ -175,7 +175,7 @@ void KktSystem<Model>::solve(const ContactProblem& problem, std::span<const Load
   }
 }
 
-#define CCR_INSTANTIATE(Model)     \
+#define CCR_INSTANTIATE(Model)      \
   template struct Direction<Model>; \
   template class KktSystem<Model>;
 CCR_EACH_MODEL(CCR_INSTANTIATE)

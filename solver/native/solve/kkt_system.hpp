@@ -29,7 +29,8 @@ class KktSystem {
   using Direction = ccr::Direction<Model>;
   using Slope = typename ContactProblem::Slope;
 
-  // Something to respond to, a slope of a gap or else that of the Lagrangian at the problem, and where its response goes.
+  // Something to respond to, a slope of a gap or else that of the Lagrangian at the problem, and where its response
+  // goes.
   struct Load {
     const Slope* gap;
     Direction* response;
@@ -44,9 +45,9 @@ class KktSystem {
   // H⁻¹ times the slope of a gap, or -H⁻¹ times that of the Lagrangian.
   void solve(const ContactProblem& problem, std::span<const Load> loads);
 
-  std::int64_t factorizations = 0;  // so far
-  double penalty(int j) const { return penalty_[j]; }  // on an active gap, in their order
-  double max_curvature() const { return max_curvature_; }        // largest curvature of a control
+  std::int64_t factorizations = 0;                         // so far
+  double penalty(int j) const { return penalty_[j]; }      // on an active gap, in their order
+  double max_curvature() const { return max_curvature_; }  // largest curvature of a control
 
  private:
   static constexpr int kSpace = Model::kSpace;
@@ -69,11 +70,11 @@ class KktSystem {
   std::vector<double> penalty_;
   std::vector<Mat<kSpace, kSpace>> mount_hessian_, mount_factor_;  // of each mount by itself
   std::vector<Column> columns_;
-  int touched_ = 0;             // columns in use
-  std::vector<double> schur_;   // Cholesky factor, (touched, touched)
-  std::vector<double> moves_;   // of the touched columns
+  int touched_ = 0;            // columns in use
+  std::vector<double> schur_;  // Cholesky factor, (touched, touched)
+  std::vector<double> moves_;  // of the touched columns
   double max_curvature_ = 0;
-  double arm_ = 1;              // turns the damping of a control into that of a displacement [mm]
+  double arm_ = 1;  // turns the damping of a control into that of a displacement [mm]
   std::vector<typename System::Load> loads_;
 };
 

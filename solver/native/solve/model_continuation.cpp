@@ -104,7 +104,8 @@ void ModelContinuation<Model>::update_trend() {
   const double travelled = travel(present_.command, trial_.command);
   clear_trend();
   if (travelled == 0 || trial_.command.length != present_.command.length || !problem_.touches_obstacle(now) ||
-      before.count != now.count || !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
+      before.count != now.count ||
+      !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
     return;
   const auto slope = [&](const auto& now, const auto& before, auto& slope) {
     for (std::size_t k = 0; k < slope.v.size(); ++k) slope[k] = (now[k] - before[k]) / travelled;
@@ -150,8 +151,8 @@ void ModelContinuation<Model>::evaluate_present() {
   present_evaluated_ = true;
 }
 
-// The command that is gone for: while anything touches, the cables are not slackened below a pretension, where they alone
-// give the robot its shape.
+// The command that is gone for: while anything touches, the cables are not slackened below a pretension, where they
+// alone give the robot its shape.
 template <class Model>
 ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(Command wanted) const {
   const double pretension = kPretension * problem_.robot().offset;
@@ -229,8 +230,8 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   return true;
 }
 
-// Tensions of the free robot where it first touches, found by bisection between the start of the step and `present_`, each
-// with the sign of its displacement.
+// Tensions of the free robot where it first touches, found by bisection between the start of the step and `present_`,
+// each with the sign of its displacement.
 template <class Model>
 ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command& start) {
   const auto clear = [&](double part) {
@@ -318,17 +319,17 @@ Optimality ModelContinuation<Model>::optimality(const double* block) {
   return found;
 }
 
-#define CCR_INSTANTIATE(Model)                                                         \
-  template ModelContinuation<Model>::ModelContinuation(const Robot&, int);             \
-  template Status ModelContinuation<Model>::pursue(const Command&);                    \
+#define CCR_INSTANTIATE(Model)                                                                 \
+  template ModelContinuation<Model>::ModelContinuation(const Robot&, int);                     \
+  template Status ModelContinuation<Model>::pursue(const Command&);                            \
   template StepResult ModelContinuation<Model>::follow(const double*, const double*, double*); \
-  template void ModelContinuation<Model>::evaluate_present();                          \
-  template void ModelContinuation<Model>::accept();                                    \
-  template void ModelContinuation<Model>::record_shape();                              \
-  template void ModelContinuation<Model>::clear_trend();                               \
-  template void ModelContinuation<Model>::extrapolate_trial();                         \
-  template bool ModelContinuation<Model>::pulls_cable(const Command&) const;           \
-  template bool ModelContinuation<Model>::only_releases(const Command&) const;         \
+  template void ModelContinuation<Model>::evaluate_present();                                  \
+  template void ModelContinuation<Model>::accept();                                            \
+  template void ModelContinuation<Model>::record_shape();                                      \
+  template void ModelContinuation<Model>::clear_trend();                                       \
+  template void ModelContinuation<Model>::extrapolate_trial();                                 \
+  template bool ModelContinuation<Model>::pulls_cable(const Command&) const;                   \
+  template bool ModelContinuation<Model>::only_releases(const Command&) const;                 \
   template double ModelContinuation<Model>::command_distance(const Command&, const Command&) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

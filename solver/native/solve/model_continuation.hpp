@@ -14,8 +14,8 @@
 
 namespace ccr {
 
-// Change of the equilibrium per unit of travel of the command, from which the search for the next one starts. Zero for a
-// free robot, and after a contact came or went.
+// Change of the equilibrium per unit of travel of the command, from which the search for the next one starts. Zero for
+// a free robot, and after a contact came or went.
 template <class Model>
 struct Trend {
   std::vector<typename Model::Control> controls;
@@ -119,27 +119,27 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Newton<Model> newton_;
   ContactProblem& problem_ = newton_.problem;
   Iterate present_, trial_;
-  Trend<Model> trend_;              // at `present_`
-  double energy_ = 0;               // of `present_`
+  Trend<Model> trend_;  // at `present_`
+  double energy_ = 0;   // of `present_`
   Tensions tensions_{}, trial_tensions_{};
   bool present_evaluated_ = false;  // whether the contact problem is evaluated at `present_`
 
-  StepResult result_;                    // of the step under way
-  std::vector<double>* shapes_ = nullptr;  // receives the accepted shapes of a trace
+  StepResult result_;                       // of the step under way
+  std::vector<double>* shapes_ = nullptr;   // receives the accepted shapes of a trace
   std::int64_t factorizations_before_ = 0;  // of the step
-  Tensions onset_{};                // tensions where the present contact began
-  bool began_in_contact_ = false;   // whether an obstacle was touched where the step began
-  Iterate last_held_;               // the last equilibrium of the step that the motors held, where a later one was not
-  bool was_exceeded_ = false;       // whether there is one
+  Tensions onset_{};                        // tensions where the present contact began
+  bool began_in_contact_ = false;           // whether an obstacle was touched where the step began
+  Iterate last_held_;          // the last equilibrium of the step that the motors held, where a later one was not
+  bool was_exceeded_ = false;  // whether there is one
 
   std::vector<Position> nodes_;  // of the block last read
   std::vector<Frame> frames_;
   std::vector<Position> points_, mounts_;  // of the last accepted shape
   std::vector<Control> predicted_;         // controls of `trial_` along the trend
   bool has_trend_ = false;
-  Iterate back_;                  // scratch of `way_back_returns`
+  Iterate back_;                   // scratch of `way_back_returns`
   std::vector<Control> unloaded_;  // scratch of `is_blocked`: slope of the energy alone
-  Iterate descent_start_;         // where a descent began, and its points, mounts and recorded shapes
+  Iterate descent_start_;          // where a descent began, and its points, mounts and recorded shapes
   std::vector<Position> descent_points_, descent_mounts_;
   std::size_t descent_trace_ = 0;
 };

@@ -186,7 +186,8 @@ bool Newton<Model>::set_metric(const Iterate& at) {
   creeping_ = false;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
-  return factor_convexified(at.active, kDescentPenalties) && kkt_.factor(damping_ + kMeasureDamping * kkt_.max_curvature());
+  return factor_convexified(at.active, kDescentPenalties) &&
+         kkt_.factor(damping_ + kMeasureDamping * kkt_.max_curvature());
 }
 
 template <class Model>
@@ -235,7 +236,8 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   // Energy may rise by what it costs to close gaps that are open by as little as is not told from closed.
   const double before = problem.energy();
   double allowed = before + kEnergyRoundoff * before;
-  for (int j = 0; j < target.count; ++j) allowed += 2 * kDescentFeasibility * problem.robot().max_length * target.multiplier[j];
+  for (int j = 0; j < target.count; ++j)
+    allowed += 2 * kDescentFeasibility * problem.robot().max_length * target.multiplier[j];
   const double whole = std::min(1.0, largest / step_size(step_));
   trial_.command = at.command;
   const ActiveSet touching = closed_contacts(target);

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "solve/contact_problem.hpp"
 #include "solve/active_set_qp.hpp"
+#include "solve/contact_problem.hpp"
 #include "solve/kkt_system.hpp"
 
 namespace ccr {
@@ -59,8 +59,8 @@ class Newton {
   double step_size_ = 0;  // of `step_`
   Iterate trial_;
   double damping_ = 0;
-  double needed_ = 0;   // of damping, in the descent that goes on
-  double stretch_ = 1;  // of its next damped iterate
+  double needed_ = 0;      // of damping, in the descent that goes on
+  double stretch_ = 1;     // of its next damped iterate
   bool creeping_ = false;  // whether its iterates hardly move
 };
 

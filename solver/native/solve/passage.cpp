@@ -48,7 +48,8 @@ bool ModelContinuation<Model>::passage_is_clear(int j, double moved) const {
   const auto from = [&](int k) { return minus(points_[k], before); };
   const auto to = [&](int k) { return minus(problem_.points()[k], now); };
   const auto away = [&](int k) {  // on all of its way; a gap out of reach is not measured
-    return std::isfinite(gaps[k]) ? distance_outside(obstacle, gaps[k]) >= moved : clearance_beyond(obstacle, to(k), moved) > 0;
+    return std::isfinite(gaps[k]) ? distance_outside(obstacle, gaps[k]) >= moved
+                                  : clearance_beyond(obstacle, to(k), moved) > 0;
   };
   for (int line = 0, first = 0; line < static_cast<int>(robot.lines.size()); ++line, first += robot.positions()) {
     const double longest = robot.edges[line];
@@ -56,15 +57,16 @@ bool ModelContinuation<Model>::passage_is_clear(int j, double moved) const {
     for (int k = first; k < first + robot.positions(); ++k) {
       if (!obstacle.touchable[k]) continue;
       if (!away(k) && norm(minus(to(k), from(k))) > path && !path_clear(obstacle, from(k), to(k))) return false;
-      if (!edges || k + 1 == first + robot.positions() || !obstacle.touchable[k + 1] || (away(k) && away(k + 1))) continue;
+      if (!edges || k + 1 == first + robot.positions() || !obstacle.touchable[k + 1] || (away(k) && away(k + 1)))
+        continue;
       if (!edge_clear<kSpace>(obstacle, {from(k), from(k + 1)}, {to(k), to(k + 1)}, longest / 2)) return false;
     }
   }
   return true;
 }
 
-#define CCR_INSTANTIATE(Model)                                                   \
-  template double ModelContinuation<Model>::largest_motion() const;              \
+#define CCR_INSTANTIATE(Model)                                      \
+  template double ModelContinuation<Model>::largest_motion() const; \
   template bool ModelContinuation<Model>::passage_is_clear(double) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

@@ -6,8 +6,8 @@ namespace ccr {
 // How a step ended; where several things happened, the highest value. The values are those of solver.Status in Python.
 enum class Status { kConverged, kSnapped, kStalled, kBlocked, kGaveUp };
 
-// Why a step was given up: a descent led to where a segment folds over, the step spent its budget of factorisations, or a
-// descent found no way on.
+// Why a step was given up: a descent led to where a segment folds over, the step spent its budget of factorisations, or
+// a descent found no way on.
 enum class Reason { kNone, kFolded, kWork, kStuck };
 
 struct StepResult {
@@ -17,8 +17,9 @@ struct StepResult {
   int factorizations = 0;  // of the KKT system
 };
 
-// Residuals of the KKT conditions, without units: the largest slope of the Lagrangian in a control [rad²], the largest gap
-// that is violated, or open and active, over the robot's length, and the largest product of a multiplier and its gap [rad²].
+// Residuals of the KKT conditions, without units: the largest slope of the Lagrangian in a control [rad²], the largest
+// gap that is violated, or open and active, over the robot's length, and the largest product of a multiplier and its
+// gap [rad²].
 struct Optimality {
   double stationarity = 0, gap = 0, complementarity = 0;
 };

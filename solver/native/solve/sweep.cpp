@@ -45,8 +45,8 @@ double nearest(const std::vector<Position<D>>& outline, const Position<D>& point
   return std::sqrt(square);
 }
 
-// The largest depth along an edge, or a bound of it that is no more than `enough`: no point of an edge is deeper than the
-// mean of what its ends are, and of its length.
+// The largest depth along an edge, or a bound of it that is no more than `enough`: no point of an edge is deeper than
+// the mean of what its ends are, and of its length.
 template <int D>
 double deepest(const Obstacle<D>& obstacle, const Edge<D>& edge, double at_start, double at_end, double enough,
                int halvings) {
@@ -102,7 +102,8 @@ bool edge_clear(const Obstacle<D>& obstacle, const Edge<D>& from, const Edge<D>&
     const double t = at / motion;
     const Edge<D> edge{lerp(from.start, to.start, t), lerp(from.end, to.end, t)};
     const double enough = half - std::min(motion - at, half / 8);
-    const double left = half - deepest(obstacle, edge, depth(obstacle, edge.start), depth(obstacle, edge.end), enough, kEdgeHalvings);
+    const double left =
+        half - deepest(obstacle, edge, depth(obstacle, edge.start), depth(obstacle, edge.end), enough, kEdgeHalvings);
     if (!(left > 0)) return false;
     at += left;
     if (at >= motion) return true;
@@ -116,8 +117,8 @@ double harmless_path(const Obstacle<D>& obstacle) {
   return std::max(kSweepStride * obstacle.min_curvature_radius, 2 * kSweepDepth * obstacle.inradius);
 }
 
-// A point of the core lies nearer than R - h/2 to the middle of a ball of the radius of curvature R inside the obstacle.
-// Edges with their ends outside that ball stay sqrt(R² - h²/4) away from its middle, and on ways of length m
+// A point of the core lies nearer than R - h/2 to the middle of a ball of the radius of curvature R inside the
+// obstacle. Edges with their ends outside that ball stay sqrt(R² - h²/4) away from its middle, and on ways of length m
 // sqrt(R² - h²/4 - m²/4).
 template <int D>
 double harmless_motion(const Obstacle<D>& obstacle, double longest) {
@@ -125,12 +126,12 @@ double harmless_motion(const Obstacle<D>& obstacle, double longest) {
   return 2 * std::sqrt(longest * std::max(0.0, obstacle.min_curvature_radius - longest / 2));
 }
 
-#define CCR_INSTANTIATE(D)                                                                                 \
-  template double depth(const Obstacle<D>&, const Position<D>&);                                           \
-  template double distance_outside(const Obstacle<D>&, double);                                            \
-  template bool path_clear(const Obstacle<D>&, const Position<D>&, const Position<D>&);                    \
-  template bool edge_clear(const Obstacle<D>&, const Edge<D>&, const Edge<D>&, double);                    \
-  template double harmless_path(const Obstacle<D>&);                                                       \
+#define CCR_INSTANTIATE(D)                                                              \
+  template double depth(const Obstacle<D>&, const Position<D>&);                        \
+  template double distance_outside(const Obstacle<D>&, double);                         \
+  template bool path_clear(const Obstacle<D>&, const Position<D>&, const Position<D>&); \
+  template bool edge_clear(const Obstacle<D>&, const Edge<D>&, const Edge<D>&, double); \
+  template double harmless_path(const Obstacle<D>&);                                    \
   template double harmless_motion(const Obstacle<D>&, double);
 CCR_INSTANTIATE(2)
 CCR_INSTANTIATE(3)

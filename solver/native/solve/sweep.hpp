@@ -1,16 +1,16 @@
 // Whether a robot passed through an obstacle on the straight ways from one accepted shape to the next.
 //
 // Contact is at points, so an edge between two of them may rest on an outline and lie in the obstacle by up to half its
-// length h: a point of it is no farther than that from the nearer end, which is outside. What no robot can do is have an
-// edge in the core of the obstacle, the points deeper in it than h/2.
+// length h: a point of it is no farther than that from the nearer end, which is outside. What no robot can do is have
+// an edge in the core of the obstacle, the points deeper in it than h/2.
 #pragma once
 
 #include "model/obstacle.hpp"
 
 namespace ccr {
 
-// How deep a point is in an obstacle, as exactly as its outline is given; at most 0 outside, and then no nearer than that
-// [mm].
+// How deep a point is in an obstacle, as exactly as its outline is given; at most 0 outside, and then no nearer than
+// that [mm].
 template <int D>
 double depth(const Obstacle<D>& obstacle, const Position<D>& point);
 

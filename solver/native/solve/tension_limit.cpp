@@ -40,7 +40,8 @@ bool ModelContinuation<Model>::approach_tension_limit() {
   for (int i = 0; i < kStallIterations && !is_at_tension_limit(); ++i) {
     const double width = high - low;
     if (!(width * span > kCommandResolution)) break;
-    const double middle = std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
+    const double middle =
+        std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
     const Move move = try_command(between(start, end, middle));
     if (move == Move::kRejected) return false;
     if (move == Move::kAccepted) {
@@ -58,7 +59,8 @@ bool ModelContinuation<Model>::approach_tension_limit() {
   return true;
 }
 
-// Gives up pulling the cables whose tension is at the limit, or else all that are pulled. False where there is one cable.
+// Gives up pulling the cables whose tension is at the limit, or else all that are pulled. False where there is one
+// cable.
 template <class Model>
 bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
   if (kCables == 1) return false;
@@ -75,7 +77,8 @@ bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
   return give_up(problem_.robot().max_tension * (1 - kTensionBand)) || give_up(-HUGE_VAL);
 }
 
-// Lets out, by at least so much, the cables whose motors cannot hold them. False where the command lets them out farther.
+// Lets out, by at least so much, the cables whose motors cannot hold them. False where the command lets them out
+// farther.
 template <class Model>
 bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const {
   const Robot& robot = problem_.robot();
@@ -83,7 +86,8 @@ bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const
   for (int k = 0; k < kCables; ++k) {
     const double present = present_.command.cables[k];
     const double held = std::max(std::abs(present) - least * robot.offset, 0.0);
-    if (tensions_[k] <= robot.max_tension || present == 0 || wanted.cables[k] / present <= held / std::abs(present)) continue;
+    if (tensions_[k] <= robot.max_tension || present == 0 || wanted.cables[k] / present <= held / std::abs(present))
+      continue;
     wanted.cables[k] = std::copysign(held, present);
     changed = true;
   }
@@ -98,8 +102,8 @@ bool ModelContinuation<Model>::is_unyielding() const {
   return false;
 }
 
-// The active set at `present_`; where that is empty, the gap that is violated most under a command, with a multiplier of
-// one. False where there is none.
+// The active set at `present_`; where that is empty, the gap that is violated most under a command, with a multiplier
+// of one. False where there is none.
 template <class Model>
 bool ModelContinuation<Model>::find_holding_set(const Command& command, ActiveSet& holding) {
   holding = present_.active;
@@ -137,18 +141,19 @@ bool ModelContinuation<Model>::is_blocked(const Command& command) {
     for (int k = 0; k < Model::kControl; ++k)
       balance = std::max(balance, std::abs(problem_.gradient()[i][k] - unloaded_[i][k]));
   for (std::size_t m = 0; m < present_.mounts.size(); ++m)
-    balance = std::max(balance, robot.max_length / robot.segments * norm(problem_.mount_load(holding, static_cast<int>(m))));
+    balance =
+        std::max(balance, robot.max_length / robot.segments * norm(problem_.mount_load(holding, static_cast<int>(m))));
   return balance <= kBarred * pressed;
 }
 
-#define CCR_INSTANTIATE(Model)                                                            \
-  template bool ModelContinuation<Model>::is_at_tension_limit() const;                    \
-  template bool ModelContinuation<Model>::is_tight() const;                               \
-  template void ModelContinuation<Model>::keep_last_held(const Iterate&);                 \
-  template bool ModelContinuation<Model>::approach_tension_limit();                       \
-  template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;            \
-  template bool ModelContinuation<Model>::yield_cables(Command&, double) const;           \
-  template bool ModelContinuation<Model>::is_unyielding() const;                          \
+#define CCR_INSTANTIATE(Model)                                                  \
+  template bool ModelContinuation<Model>::is_at_tension_limit() const;          \
+  template bool ModelContinuation<Model>::is_tight() const;                     \
+  template void ModelContinuation<Model>::keep_last_held(const Iterate&);       \
+  template bool ModelContinuation<Model>::approach_tension_limit();             \
+  template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;  \
+  template bool ModelContinuation<Model>::yield_cables(Command&, double) const; \
+  template bool ModelContinuation<Model>::is_unyielding() const;                \
   template bool ModelContinuation<Model>::is_blocked(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

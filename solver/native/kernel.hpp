@@ -1,0 +1,204 @@
+// The calls of the module solver._kernel: one robot in one scene, and a batch of them.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <chrono>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "batch.hpp"
+#include "kernel_input.hpp"
+
+namespace ccr::binding {
+
+// Lets the interpreter handle signals now and then during a long call without its lock; true once one raised an error.
+class Interruption {
+ public:
+  bool operator()() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - last_ < std::chrono::milliseconds(50)) return false;
+    last_ = now;
+    nb::gil_scoped_acquire held;
+    return raised_ = PyErr_CheckSignals() != 0;
+  }
+  bool raised() const { return raised_; }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  bool raised_ = false;
+};
+
+// Gaps of points (k, D) to one obstacle and their slopes: value and slope of each.
+template <int D>
+void measure_gaps(Shape shape, const Input& parameters, const Input& points, const Output& gaps) {
+  require(points.size() % D == 0 && D * gaps.size() == (D + 1) * points.size(), "points (k, d) give gaps (k, d + 1)");
+  Obstacle<D> obstacle{};
+  obstacle.shape = shape;
+  obstacle.parameters = shape_parameters(parameters);
+  for (std::size_t k = 0; k < points.size() / D; ++k) {
+    const Gap<D> gap = measure_gap(obstacle, position<D>(points.data() + D * k));
+    double* to = gaps.data() + (D + 1) * k;
+    *to = gap.value;
+    std::copy_n(gap.slope.v.begin(), D, to + 1);
+  }
+}
+
+// One robot in one scene.
+template <int D>
+class Kernel {
+ public:
+  Kernel(const Robot& robot, std::vector<Obstacle<D>> obstacles)
+      : obstacles_(std::move(obstacles)),
+        continuation_(make_continuation<D>(robot, static_cast<int>(obstacles_.size()))) {
+    require_points(continuation_->layout(), obstacles_);
+    continuation_->set_obstacles(obstacles_);
+  }
+
+  std::size_t block_size() const { return continuation_->layout().size; }
+
+  std::tuple<Status, int, int> step(const Input& from, const Numbers<D>& command, const Output& to) {
+    require_block(from);
+    require_size(to.size());
+    const StepResult result = continuation_->follow(from.data(), command.data(), to.data());
+    return {result.status, result.iterations, result.factorizations};
+  }
+
+  std::tuple<std::vector<double>, Reason> trace(const Input& from, const Numbers<D>& command) {
+    require_block(from);
+    std::vector<double> shapes, to(block_size());
+    const StepResult result = continuation_->trace(from.data(), command.data(), to.data(), shapes);
+    return {std::move(shapes), result.reason};
+  }
+
+  Numbers<3> optimality(const Input& block) {
+    require_block(block);
+    const Optimality found = continuation_->optimality(block.data());
+    return {found.stationarity, found.gap, found.complementarity};
+  }
+
+ private:
+  void require_block(const Input& block) const {
+    require_size(block.size());
+    require_sound<D>(continuation_->layout(), block.data());
+  }
+
+  void require_size(std::size_t size) const {
+    require(size == block_size(), "the block has " + std::to_string(size) +
+                                      " numbers; that of this robot and scene has " + std::to_string(block_size()));
+  }
+
+  std::vector<Obstacle<D>> obstacles_;
+  std::unique_ptr<Continuation<D>> continuation_;
+};
+
+template <int D>
+void require_index(const Batch<D>& batch, int robot) {
+  require(robot >= 0 && robot < batch.count(), "robot index " + std::to_string(robot) +
+                                                   " is out of range; the batch has " + std::to_string(batch.count()) +
+                                                   " robots");
+}
+
+template <int D>
+void require_blocks(const Batch<D>& batch, const Blocks& blocks) {
+  require(blocks.shape(0) == static_cast<std::size_t>(batch.count()) && blocks.shape(1) == batch.layout().size,
+          "blocks must be (" + std::to_string(batch.count()) + ", " + std::to_string(batch.layout().size) + ")");
+}
+
+// Works on these robots without the interpreter's lock, until a signal raises an error.
+template <int D, class Work>
+void each(Batch<D>& batch, const std::vector<int>& robots, Work work) {
+  Interruption interruption;
+  {
+    nb::gil_scoped_release released;
+    batch.each(robots, work, interruption);
+  }
+  if (interruption.raised()) throw nb::python_error();
+}
+
+template <int D>
+void set_obstacles(Batch<D>& batch, int robot, std::vector<Obstacle<D>> obstacles) {
+  const typename Batch<D>::Lock lock(batch);
+  require_index(batch, robot);
+  require(static_cast<int>(obstacles.size()) == batch.obstacles(),
+          "the scene must have as many obstacles as the batch was made for, " + std::to_string(batch.obstacles()));
+  require_points(batch.layout(), obstacles);
+  batch.set_obstacles(robot, std::move(obstacles));
+}
+
+template <int D>
+void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands, const Blocks& blocks,
+          const Counts& statuses, const Counts& iterations, const Counts& factorizations) {
+  const typename Batch<D>::Lock lock(batch);
+  const std::size_t count = batch.count(), size = batch.layout().size;
+  require_blocks(batch, blocks);
+  require(commands.shape(0) == count && commands.shape(1) == D,
+          "commands must have a row of cables and length for each robot");
+  require(statuses.shape(0) == count && iterations.shape(0) == count && factorizations.shape(0) == count,
+          "statuses, iterations and factorizations must have a number for each robot");
+  double* block = blocks.data();
+  const double* command = commands.data();
+  std::int64_t *status = statuses.data(), *iterated = iterations.data(), *factored = factorizations.data();
+  for (const int robot : robots) {
+    require_index(batch, robot);
+    require_sound<D>(batch.layout(), block + size * robot);
+    require_command<D>(command + D * robot);
+  }
+  each(batch, robots, [&](Continuation<D>& continuation, int k) {
+    const int i = robots[k];
+    const StepResult result = continuation.follow(block + size * i, command + D * i, block + size * i);
+    status[i] = static_cast<int>(result.status);
+    iterated[i] = result.iterations;
+    factored[i] = result.factorizations;
+  });
+}
+
+template <int D>
+void optimality(Batch<D>& batch, const Blocks& blocks, const Blocks& found) {
+  const typename Batch<D>::Lock lock(batch);
+  require_blocks(batch, blocks);
+  require(found.shape(0) == blocks.shape(0) && found.shape(1) == 3,
+          "found must have a row of three numbers for each robot");
+  const std::size_t size = batch.layout().size;
+  const double* block = blocks.data();
+  double* to = found.data();
+  std::vector<int> all(batch.count());
+  std::iota(all.begin(), all.end(), 0);
+  for (const int i : all) require_sound<D>(batch.layout(), block + size * i);
+  each(batch, all, [&](Continuation<D>& continuation, int k) {
+    const Optimality at = continuation.optimality(block + size * k);
+    const double numbers[] = {at.stationarity, at.gap, at.complementarity};
+    std::copy_n(numbers, 3, to + 3 * k);
+  });
+}
+
+template <int D>
+std::vector<int> ramps_reach_forces(Batch<D>& batch, const std::vector<int>& robots, const Values& forces, int obstacle,
+                                    const Table& directions, double increment, double limit, double length,
+                                    const Blocks& reached) {
+  const typename Batch<D>::Lock lock(batch);
+  const std::size_t count = robots.size();
+  require(forces.shape(0) == count && directions.shape(0) == count && directions.shape(1) == D - 1 &&
+              reached.shape(0) == count && reached.shape(1) == D,
+          "forces (k), directions (k, cables) and reached (k, d) must have a row for each robot");
+  for (const int robot : robots) require_index(batch, robot);
+  std::vector<int> found(count);
+  const double *force = forces.data(), *direction = directions.data();
+  double* to = reached.data();
+  each(batch, robots, [&](Continuation<D>& continuation, int k) {
+    found[k] = continuation.ramp_reaches_force({.force = force[k],
+                                                .obstacle = obstacle,
+                                                .direction = direction + (D - 1) * k,
+                                                .increment = increment,
+                                                .limit = limit,
+                                                .length = length},
+                                               to + D * k);
+  });
+  return found;
+}
+
+}  // namespace ccr::binding

@@ -1,0 +1,120 @@
+// Robots, obstacles and blocks as Python gives them, checked.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "solve/continuation.hpp"
+
+namespace ccr::binding {
+
+namespace nb = nanobind;
+
+using Input = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+using Output = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
+using Mask = nb::ndarray<const bool, nb::c_contig, nb::device::cpu>;
+using Blocks = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Counts = nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Values = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+template <int D>
+using Numbers = std::array<double, D>;  // a command: cables, then length
+
+inline void require(bool condition, const std::string& message) {
+  if (!condition) throw std::invalid_argument(message);
+}
+
+inline Robot make_robot(ModelKind model, int segments, double offset, double angle, double rigidity, double max_tension,
+                        double max_length, double disk_radius, double disk_thickness,
+                        const std::vector<Numbers<2>>& lines, const std::vector<double>& edges, int between) {
+  require(edges.size() == lines.size() && !lines.empty(),
+          "edges must name the longest edge of each line, of one at least");
+  std::vector<Vec<2>> on_disk;
+  for (const Numbers<2>& line : lines) on_disk.push_back({line});
+  return {.model = model,
+          .segments = segments,
+          .offset = offset,
+          .angle = angle,
+          .rigidity = rigidity,
+          .max_tension = max_tension,
+          .max_length = max_length,
+          .disk_radius = disk_radius,
+          .disk_thickness = disk_thickness,
+          .lines = std::move(on_disk),
+          .edges = edges,
+          .between = between};
+}
+
+template <int D>
+Position<D> position(const double* numbers) {
+  Position<D> out;
+  std::copy_n(numbers, D, out.v.begin());
+  return out;
+}
+
+inline std::array<double, kShapeSize> shape_parameters(const Input& parameters) {
+  require(parameters.size() <= kShapeSize, "parameters are more than a shape has, SHAPE_SIZE");
+  std::array<double, kShapeSize> out{};
+  std::copy_n(parameters.data(), parameters.size(), out.begin());
+  return out;
+}
+
+template <int D>
+Obstacle<D> make_obstacle(Shape shape, const Input& parameters, const Numbers<D>& center, double radius,
+                          double min_curvature_radius, double inradius, const Input& outline, const Mask& touchable,
+                          const Input& spring, std::uintptr_t law) {
+  require(spring.size() == D * D && outline.size() % D == 0, "spring is (d, d), outline (k, d)");
+  const bool *first = touchable.data(), *last = first + touchable.size();
+  Obstacle<D> obstacle{.shape = shape,
+                       .parameters = shape_parameters(parameters),
+                       .law = reinterpret_cast<Law>(law),
+                       .center = {center},
+                       .radius = radius,
+                       .min_curvature_radius = min_curvature_radius,
+                       .inradius = inradius,
+                       .outline = {},
+                       .touchable = {first, last},
+                       .everywhere = std::find(first, last, false) == last,
+                       .mounted = spring.data()[0] > 0,
+                       .spring = {}};
+  for (std::size_t k = 0; k < outline.size(); k += D) obstacle.outline.push_back(position<D>(outline.data() + k));
+  std::copy_n(spring.data(), D * D, obstacle.spring.v.begin());
+  return obstacle;
+}
+
+// Refuses obstacles that do not say of each point of a robot whether it can touch them.
+template <int D>
+void require_points(const BlockLayout& layout, const std::vector<Obstacle<D>>& obstacles) {
+  for (const Obstacle<D>& obstacle : obstacles)
+    require(obstacle.touchable.size() == layout.flags.size,
+            "touchable must have an entry for each point of the robot, " + std::to_string(layout.flags.size));
+}
+
+// Refuses commands that are not finite, and a length that is not positive.
+template <int D>
+void require_command(const double* command) {
+  for (int k = 0; k < D; ++k)
+    require(std::isfinite(command[k]), "a command, or that in the block of an equilibrium, is not finite");
+  require(command[D - 1] > 0, "a length, or that in the block of an equilibrium, is not positive");
+}
+
+// Refuses blocks that no robot can have: the kernel needs a finite command and a positive length.
+template <int D>
+void require_sound(const BlockLayout& layout, const double* block) {
+  Numbers<D> command;
+  std::copy_n(block + layout.cables.offset, D - 1, command.begin());
+  command[D - 1] = block[layout.length.offset];
+  require_command<D>(command.data());
+}
+
+}  // namespace ccr::binding
