@@ -1,4 +1,4 @@
-// Threads that wait for work.
+// A pool of threads that wait for work.
 #pragma once
 
 #include <unistd.h>
@@ -17,7 +17,7 @@ class Pool {
   Pool(const Pool&) = delete;
   ~Pool() { stop(); }
 
-  // Calls `job` with 0 in this thread and 1, 2, ... in the helpers, and returns when all have.
+  // Calls `job` with 0 in this thread and with 1, 2, … in the helpers; returns when all calls have returned.
   void run(const std::function<void(int)>& job) {
     if (!team_ || team_->process != getpid()) start();
     Team& team = *team_;
@@ -38,7 +38,7 @@ class Pool {
     std::vector<std::thread> threads;
   };
 
-  static constexpr int kSpins = 2000;  // before a thread goes to sleep
+  static constexpr int kSpins = 2000;  // before a waiting thread sleeps
 
   template <class Done>
   static int await(std::atomic<int>& value, Done done) {
@@ -51,7 +51,7 @@ class Pool {
     return now;
   }
 
-  // A process that was forked has none of the threads: it leaves the old team alone and starts one of its own.
+  // Threads do not survive a fork: the child abandons the old team and starts its own.
   void start() {
     team_.release();
     team_ = std::make_unique<Team>();

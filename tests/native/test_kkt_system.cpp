@@ -95,7 +95,48 @@ void slopes() {
   }
 }
 
-// Of a step, what the Hessian by differences makes of it must be what was asked for.
+// Gradients of the active gaps by differences, a row each.
+template <class Model>
+Dense gap_gradients(Touched<Model>& touched) {
+  const ActiveSet& active = touched.at.active;
+  const Dense gaps = touched.differences(active.count, [&](const auto& there) {
+    REQUIRE(touched.problem.evaluate(there));
+    Column out;
+    for (int j = 0; j < active.count; ++j) out.push_back(touched.problem.gaps()[active.contact[j]]);
+    return out;
+  });
+  lagrangian_slope(touched.problem, touched.at);  // back at the shape
+  return gaps;
+}
+
+// Solutions of the system, multiplied by a Hessian by differences, must give the right-hand sides back.
+template <class Model>
+void check_solutions(Touched<Model>& touched, KktSystem<Model>& system, const Dense& hessian, const Dense& gaps) {
+  const ActiveSet& active = touched.at.active;
+  std::vector<typename ContactProblem<Model>::Slope> gradients;
+  std::vector<Direction<Model>> responses(active.count + 1, Direction<Model>(touched.robot.segments, touched.kSprings));
+  for (int j = 0; j < active.count; ++j) gradients.push_back(touched.problem.slope(active.contact[j]));
+  std::vector<typename KktSystem<Model>::Load> loads = {{nullptr, &responses.back()}};
+  for (int j = 0; j < active.count; ++j) loads.push_back({&gradients[j], &responses[j]});
+  system.solve(touched.problem, loads);
+  const auto check = [&](const Direction<Model>& response, const Column& right) {
+    const Column unknowns = flat<Model>(response.controls, response.mounts);
+    CHECK(apart(product(hessian, unknowns), right) <= 1e-5 * (largest(right) + largest(unknowns)));
+  };
+  Column down = lagrangian_slope(touched.problem, touched.at);
+  for (double& part : down) part = -part;
+  check(responses.back(), down);
+  for (int j = 0; j < active.count; ++j) {
+    Column row;
+    for (int c = 0; c < gaps.columns(); ++c) row.push_back(gaps(j, c));
+    check(responses[j], row);
+    const Column moved = product(gaps, flat<Model>(responses[j].controls, responses[j].mounts));
+    for (int k = 0; k < active.count; ++k)  // motion of the gaps along the response
+      CHECK(gradients[k].along(responses[j]) ==
+            doctest::Approx(moved[k]).epsilon(1e-5).scale(std::abs(gradients[j].along(responses[j]))));
+  }
+}
+
 template <class Model>
 void kkt_systems() {
   Random random(2);
@@ -105,19 +146,9 @@ void kkt_systems() {
     ContactProblem<Model>& problem = touched.problem;
     const int n = static_cast<int>(unknowns(touched.at));
     Dense expected = touched.differences(n, [&](const auto& there) { return lagrangian_slope(problem, there); });
-    const Column slope = lagrangian_slope(problem, touched.at);
-    std::vector<Column> gap_slopes;
-    const Dense gaps = touched.differences(touched.at.active.count, [&](const auto& there) {
-      REQUIRE(problem.evaluate(there));
-      Column out;
-      for (int j = 0; j < touched.at.active.count; ++j) out.push_back(problem.gaps()[touched.at.active.contact[j]]);
-      return out;
-    });
-    lagrangian_slope(problem, touched.at);
-
+    const Dense gaps = gap_gradients(touched);
     KktSystem<Model> system(touched.robot.segments, touched.kSprings);
-    const double strength = trial % 2 ? 0 : 10;
-    system.assemble(problem, touched.at.active, strength);
+    system.assemble(problem, touched.at.active, trial % 2 ? 0 : 10);
     for (int j = 0; j < touched.at.active.count; ++j)
       for (int r = 0; r < n; ++r)
         for (int c = 0; c < n; ++c) expected(r, c) += system.penalty(j) * gaps(j, r) * gaps(j, c);
@@ -129,37 +160,7 @@ void kkt_systems() {
     CHECK(system.factor(0) == (pivot > 0));
     if (pivot < 0) continue;
     ++definite;
-
-    using Slope = typename ContactProblem<Model>::Slope;
-    std::vector<Slope> loads;
-    std::vector<Direction<Model>> responses(touched.at.active.count + 1,
-                                            Direction<Model>(touched.robot.segments, touched.kSprings));
-    for (int j = 0; j < touched.at.active.count; ++j) loads.push_back(problem.slope(touched.at.active.contact[j]));
-    std::vector<typename KktSystem<Model>::Load> asked = {{nullptr, &responses.back()}};
-    for (int j = 0; j < touched.at.active.count; ++j) asked.push_back({&loads[j], &responses[j]});
-    system.solve(problem, asked);
-    const auto compare = [&](const Direction<Model>& response, const Column& right) {
-      const Column made = product(expected, flat<Model>(response.controls, response.mounts));
-      CHECK(apart(made, right) <= 1e-5 * (largest(right) + largest(flat<Model>(response.controls, response.mounts))));
-    };
-    Column down = slope;
-    for (double& part : down) part = -part;
-    compare(responses.back(), down);
-    for (int j = 0; j < touched.at.active.count; ++j) {
-      Column row;
-      for (int c = 0; c < n; ++c) row.push_back(gaps(j, c));
-      compare(responses[j], row);
-      for (int k = 0; k < touched.at.active.count; ++k)  // motion of the gaps along the response
-        CHECK(loads[k].along(responses[j]) == doctest::Approx([&] {
-                                                double along = 0;
-                                                const Column moved =
-                                                    flat<Model>(responses[j].controls, responses[j].mounts);
-                                                for (int c = 0; c < n; ++c) along += gaps(k, c) * moved[c];
-                                                return along;
-                                              }())
-                                                  .epsilon(1e-5)
-                                                  .scale(std::abs(loads[j].along(responses[j]))));
-    }
+    check_solutions(touched, system, expected, gaps);
   }
   CHECK(definite >= 5);
 }

@@ -23,11 +23,11 @@ Mat<N, N> dense(const Transition& a) {
 }
 
 template <int N>
-void draw(Random& random, Mat<N, N>& a) {
+void sample(Random& random, Mat<N, N>& a) {
   a = random.matrix<N, N>();
 }
-void draw(Random& random, Turn& a) { a = {random.uniform(-1, 1), random.uniform(-1, 1)}; }
-void draw(Random& random, Sway& a) { a.chord = random.matrix<3>(); }
+void sample(Random& random, PlanarTransition& a) { a = {random.uniform(-1, 1), random.uniform(-1, 1)}; }
+void sample(Random& random, SpatialTransition& a) { a.chord = random.matrix<3>(); }
 
 // A random problem twice: as the recursion takes it, and in the controls alone.
 template <int NX, int NU, class Transition>
@@ -42,7 +42,7 @@ struct Problem {
     }
     for (int i = 0; i < n; ++i) {
       auto& stage = system.stages[i];
-      draw(random, stage.a);
+      sample(random, stage.a);
       stage.b = random.matrix<NX, NU>();
       stage.hux = random.matrix<NU, NX>(0.3);
       stage.huu = random.symmetric<NU>(shift);
@@ -102,9 +102,52 @@ Column flat(const std::vector<Vec<N>>& blocks) {
   return out;
 }
 
+// Random right-hand sides of the recursion, one to four at a time: slopes of the controls and forces on nodes.
+template <int NX, int NU, class Transition>
+struct RightHandSides {
+  using System = Riccati<NX, NU, Transition>;
+
+  RightHandSides(Random& random, const Problem<NX, NU, Transition>& problem, int n)
+      : count(random.integer(1, 4)),
+        slopes(count, std::vector<Vec<NU>>(n)),
+        controls(slopes),
+        states(count, std::vector<Vec<NX>>(n + 1)),
+        forces(count) {
+    for (int k = 0; k < count; ++k) {
+      dense.push_back(product(transposed(problem.motion), push(random, n, forces[k])));
+      const bool sloped = random.chance(0.5);
+      for (Vec<NU>& slope : slopes[k]) slope = random.matrix<NU>();
+      if (sloped)
+        for (std::size_t i = 0; i < dense[k].size(); ++i) dense[k][i] -= flat(slopes[k])[i];
+      loads.push_back({sloped ? slopes[k].data() : nullptr, forces[k], controls[k].data(), states[k].data()});
+    }
+  }
+
+  // Adds up to two forces; returns what they make on all states.
+  static Column push(Random& random, int n, std::vector<typename System::Force>& forces) {
+    Column on_states(static_cast<std::size_t>(NX * (n + 1)));
+    for (int left = random.integer(0, 2); left > 0; --left) {
+      const int node = random.integer(0, n);
+      const bool split = node < n && random.chance(0.5);
+      forces.push_back({node, split, random.matrix<NX>(), random.matrix<NX>()});
+      for (int c = 0; c < NX; ++c) {
+        on_states[NX * node + c] += forces.back().here[c];
+        if (split) on_states[NX * (node + 1) + c] += forces.back().next[c];
+      }
+    }
+    return on_states;
+  }
+
+  int count;
+  std::vector<std::vector<Vec<NU>>> slopes, controls;
+  std::vector<std::vector<Vec<NX>>> states;
+  std::vector<std::vector<typename System::Force>> forces;
+  std::vector<typename System::Load> loads;
+  std::vector<Column> dense;  // the same in all controls
+};
+
 template <int NX, int NU, class Transition>
 void compare(std::uint64_t seed) {
-  using System = Riccati<NX, NU, Transition>;
   Random random(seed);
   int definite = 0, indefinite = 0;
   for (int trial = 0; trial < 200; ++trial) {
@@ -117,43 +160,19 @@ void compare(std::uint64_t seed) {
     ++(pivot > 0 ? definite : indefinite);
     if (pivot < 1e-6) continue;
 
-    // Slopes of the controls and forces on nodes, an odd or an even number of loads at a time.
-    const int count = random.integer(1, 4);
-    std::vector<std::vector<Vec<NU>>> slopes(count, std::vector<Vec<NU>>(n)), controls = slopes;
-    std::vector<std::vector<Vec<NX>>> states(count, std::vector<Vec<NX>>(n + 1));
-    std::vector<std::vector<typename System::Force>> forces(count);
-    std::vector<typename System::Load> loads;
-    std::vector<Column> right(count);
-    for (int k = 0; k < count; ++k) {
-      Column on_states(static_cast<std::size_t>(NX * (n + 1)));
-      for (int left = random.integer(0, 2); left > 0; --left) {
-        const int node = random.integer(0, n);
-        const bool split = node < n && random.chance(0.5);
-        forces[k].push_back({node, split, random.matrix<NX>(), random.matrix<NX>()});
-        for (int c = 0; c < NX; ++c) {
-          on_states[NX * node + c] += forces[k].back().here[c];
-          if (split) on_states[NX * (node + 1) + c] += forces[k].back().next[c];
-        }
-      }
-      right[k] = product(transposed(problem.motion), on_states);
-      const bool sloped = random.chance(0.5);
-      for (Vec<NU>& slope : slopes[k]) slope = random.matrix<NU>();
-      if (sloped)
-        for (std::size_t i = 0; i < right[k].size(); ++i) right[k][i] -= flat(slopes[k])[i];
-      loads.push_back({sloped ? slopes[k].data() : nullptr, forces[k], controls[k].data(), states[k].data()});
-    }
-    problem.system.respond(loads);
-    for (int k = 0; k < count; ++k) {
-      const Column expected = solve_cholesky(factor, right[k]), moved = product(problem.motion, expected);
+    RightHandSides<NX, NU, Transition> right(random, problem, n);
+    problem.system.respond(right.loads);
+    for (int k = 0; k < right.count; ++k) {
+      const Column expected = solve_cholesky(factor, right.dense[k]), moved = product(problem.motion, expected);
       const double scale = largest(expected) + 1e-300, reach = largest(moved) + 1e-300;
-      CHECK(apart(flat(controls[k]), expected) <= 1e-8 * scale);
-      CHECK(apart(flat(states[k]), moved) <= 1e-8 * (scale + reach));
-      for (const auto& force : forces[k]) {
+      CHECK(apart(flat(right.controls[k]), expected) <= 1e-8 * scale);
+      CHECK(apart(flat(right.states[k]), moved) <= 1e-8 * (scale + reach));
+      for (const auto& force : right.forces[k]) {
         double along = 0;
         for (int c = 0; c < NX; ++c)
           along += force.here[c] * moved[NX * force.node + c] +
                    (force.split ? force.next[c] * moved[NX * (force.node + 1) + c] : 0);
-        CHECK(std::abs(force.along(states[k]) - along) <= 1e-8 * (scale + reach) * NX);
+        CHECK(std::abs(force.along(right.states[k]) - along) <= 1e-8 * (scale + reach) * NX);
       }
     }
   }
@@ -163,17 +182,17 @@ void compare(std::uint64_t seed) {
 
 TEST_CASE("the recursion is a dense Cholesky factorisation, 3 states and 1 control") {
   compare<3, 1, Mat<3, 3>>(1);
-  compare<3, 1, Turn>(2);
+  compare<3, 1, PlanarTransition>(2);
 }
 
 TEST_CASE("the recursion is a dense Cholesky factorisation, 4 states and 1 control") {
   compare<4, 1, Mat<4, 4>>(3);
-  compare<4, 1, Turn>(4);
+  compare<4, 1, PlanarTransition>(4);
 }
 
 TEST_CASE("the recursion is a dense Cholesky factorisation, 6 states and 3 controls") {
   compare<6, 3, Mat<6, 6>>(5);
-  compare<6, 3, Sway>(6);
+  compare<6, 3, SpatialTransition>(6);
 }
 
 TEST_CASE("L D Lᵀ of a small block says whether it is positive definite, and solves") {

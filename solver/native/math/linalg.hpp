@@ -1,4 +1,4 @@
-// Fixed-size dense blocks, small enough to be unrolled by the compiler.
+// Dense matrices of fixed size, small enough for the compiler to unroll their loops.
 #pragma once
 
 #include <algorithm>
@@ -65,7 +65,8 @@ double norm(const Vec<N>& a) {
   return std::sqrt(dot(a, a));
 }
 
-// The smallest of n values, four at a time, as each comparison waits for the one before; infinity of none.
+// Returns the smallest of n values, infinity for none. Four running minima, because each comparison depends on the
+// one before.
 template <class Value>
 double lowest(int n, Value value) {
   double least[4];
@@ -77,7 +78,8 @@ double lowest(int n, Value value) {
   return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
 }
 
-// Factors a symmetric matrix in place as L D Lᵀ: unit L below the diagonal, 1/D on it. False unless positive definite.
+// Factors a symmetric matrix in place as L D Lᵀ, with unit L below the diagonal and 1/D on it; false unless it is
+// positive definite.
 template <int N>
 bool factorize(Mat<N, N>& a) {
   for (int j = 0; j < N; ++j) {

@@ -1,4 +1,5 @@
-// Newton systems of a problem: minimise ½ Σ (x,u)ᵀ H_i (x,u) + linear terms subject to x⁺ = A x + B u, x_0 = 0.
+// Riccati recursion for the KKT system of a chain: minimise ½ Σ (x,u)ᵀ H_i (x,u) + linear terms subject to
+// x⁺ = A x + B u, x_0 = 0.
 #pragma once
 
 #include <cstddef>
@@ -9,23 +10,23 @@
 
 namespace ccr {
 
-// Transition is the type of A: a Mat<NX, NX>, or anything that multiplies like one and knows its structure.
+// `Transition` is the type of A: a Mat<NX, NX>, or a type that multiplies like one and exploits its structure.
 template <int NX, int NU, class Transition = Mat<NX, NX>>
 class Riccati {
  public:
   struct Stage {
     Transition a;
     Mat<NX, NU> b;
-    Mat<NU, NX> hux;  // curvature of segment i in its control, and in control and state
+    Mat<NU, NX> hux;  // H of segment i in its control and state, and in its control
     Mat<NU, NU> huu;
   };
 
   explicit Riccati(int segments) : stages(segments), node_hessian(segments + 1), gain_(segments), factor_(segments) {}
 
   std::vector<Stage> stages;
-  std::vector<Mat<NX, NX>> node_hessian;  // curvature in the state of each node
+  std::vector<Mat<NX, NX>> node_hessian;  // H in the state of each node
 
-  // Adds curvature in the state of a node (rows) and that of the next (columns).
+  // Adds a term of H that couples the state of a node (rows) with that of the next node (columns).
   void couple(int node, const Mat<NX, NX>& cross) {
     const Mat<NX, NX> along = times(cross, stages[node].a);
     for (int r = 0; r < NX; ++r)
@@ -35,7 +36,7 @@ class Riccati {
       for (int c = 0; c < NU; ++c) stages[node].hux(c, r) += turned(r, c);
   }
 
-  // True exactly when the reduced Hessian (plus damping on the controls) is positive definite.
+  // Factors the reduced Hessian plus `damping` on the controls; false unless it is positive definite.
   bool factor(double damping) {
     Mat<NX, NX> p;
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
@@ -57,10 +58,10 @@ class Riccati {
     return true;
   }
 
-  // A force on a node and one on the next.
+  // A linear term in the state of a node, and in that of the next one where `split`.
   struct Force {
     int node;
-    bool split;  // whether there is one on the next
+    bool split;
     Vec<NX> here, next;
 
     double along(const std::vector<Vec<NX>>& states) const {
@@ -68,7 +69,7 @@ class Riccati {
     }
   };
 
-  // Something to respond to, a slope of the controls or forces, and where its response goes.
+  // A right-hand side, a gradient in the controls or else forces, and the arrays that receive its solution.
   struct Load {
     const Vec<NU>* slope;  // (n) or null
     std::span<const Force> forces;
@@ -76,14 +77,15 @@ class Riccati {
     Vec<NX>* dx;  // (n+1)
   };
 
-  // Solves for several loads: H⁻¹ times the force, or -H⁻¹ times the slope.
+  // Solves for several right-hand sides: H⁻¹ times the forces, or -H⁻¹ times the gradient. Follows a factor that
+  // returned true.
   void respond(std::span<const Load> loads) {
     for (; loads.size() >= 2; loads = loads.subspan(2)) sweep<2>(loads.data());
     if (!loads.empty()) sweep<1>(loads.data());
   }
 
  private:
-  // Several loads side by side: each waits for its own last result.
+  // Solves W right-hand sides side by side: the operations of one depend on each other, those of several do not.
   template <int W>
   void sweep(const Load* loads) {
     Vec<NX> v[W];

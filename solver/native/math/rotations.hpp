@@ -1,4 +1,4 @@
-// Turns of the plane and of space: by an angle, or by a vector of small angles about the axes of the base frame.
+// Small rotations in the plane, by an angle, and in space, by a vector about the axes of the base frame.
 #pragma once
 
 #include "math/linalg.hpp"
@@ -12,17 +12,17 @@ inline Vec<3> cross(const Vec<3>& a, const Vec<3>& b) {
   return {{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}};
 }
 
-// Motion of the end of a lever per turn of it.
+// Derivative of the end of a lever in the rotation.
 inline Mat<2, 1> swing(const Vec<2>& lever) { return {{-lever[1], lever[0]}}; }
 inline Mat<3, 3> swing(const Vec<3>& lever) {
   return {{0, lever[2], -lever[1], -lever[2], 0, lever[0], lever[1], -lever[0], 0}};
 }
 
-// Moment of a force on that end.
+// Moment of a force at the end of a lever.
 inline Vec<1> moment(const Vec<2>& lever, const Vec<2>& force) { return {{force[1] * lever[0] - force[0] * lever[1]}}; }
 inline Vec<3> moment(const Vec<3>& lever, const Vec<3>& force) { return cross(lever, force); }
 
-// Second derivative of its work in the turn.
+// Second derivative, in the rotation, of the work of a constant force at the end of a lever.
 inline Mat<1, 1> hessian_contraction(const Vec<2>& lever, const Vec<2>& force) { return {{-dot(lever, force)}}; }
 inline Mat<3, 3> hessian_contraction(const Vec<3>& lever, const Vec<3>& force) {
   Mat<3, 3> out;

@@ -1,4 +1,4 @@
-// Several numbers computed as one, so that the generated laws run on whatever vector registers there are.
+// Several doubles computed as one, so that the generated laws run on the vector registers at hand.
 #pragma once
 
 #include <cmath>
@@ -39,7 +39,8 @@ bool any(Mask mask) {
   return found;
 }
 
-// The rational approximation of Sun's fdlibm, to the last digit or the one before; NaN beyond one.
+// Arcsine by the rational approximation of Sun's fdlibm, within one or two units in the last place; NaN outside
+// [-1, 1].
 inline Lanes asin(Lanes a) {
   using Vector = Lanes::Vector;
   const Vector size = a.v < 0.0 ? -a.v : a.v;

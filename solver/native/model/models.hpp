@@ -1,4 +1,4 @@
-// The models of a robot, for all of which the solver is compiled.
+// The models that the solver is compiled for.
 #pragma once
 
 #include "model/planar.hpp"

@@ -5,7 +5,7 @@
 
 #include "tolerances.hpp"
 
-// The generated laws of the gaps, inlined here.
+// The generated gap laws, inlined here.
 #define CASADI_SYMBOL_EXPORT static inline
 #include "gap_laws.c"
 
@@ -13,8 +13,8 @@ namespace ccr {
 
 namespace {
 
-// Calls `function` with the law of the obstacle's shape, and that of the gap alone, so that they are chosen once for
-// many points.
+// Calls `function` with two laws of the shape, the gap with derivatives and the gap alone, so that the choice is made
+// once for many points.
 template <class Function>
 void with_law(const Obstacle<2>& obstacle, Function function) {
   switch (obstacle.shape) {

@@ -10,7 +10,7 @@
 
 namespace ccr {
 
-// Those of the plane, those of space, and compiled ones.
+// Shapes of the plane, then of space, then those whose gap law is compiled at run time.
 enum class Shape {
   kCircle,
   kHalfPlane,
@@ -25,35 +25,35 @@ enum class Shape {
   kCustom
 };
 
-// A compiled gap law: (point, parameters) to a Gap.
+// A gap law compiled at run time, from point and parameters to a Gap.
 using Law = int (*)(const double** in, double** out, int*, double*, int);
 
-inline constexpr int kShapeSize = 17;  // numbers of the largest shape
+inline constexpr int kShapeSize = 17;  // parameters of the largest shape
 
 template <int D>
 struct Obstacle {
   Shape shape;
-  std::array<double, kShapeSize> parameters;  // as the gap law takes them
+  std::array<double, kShapeSize> parameters;  // in the order of the gap law
   Law law;                                    // of a custom shape
-  Position<D> center;                         // of a ball that holds it
-  double radius;                              // of that ball; infinite for a wall
-  double min_curvature_radius;                // smallest radius of its surface; infinite for a wall
-  double inradius;                            // of the largest ball inside it; infinite for a wall
-  std::vector<Position<D>> outline;           // points of its surface, where its gap is no distance; else none
-  std::vector<unsigned char> touchable;       // (lines, positions): whether a point can touch it
-  bool everywhere;                            // whether all of them can
-  bool mounted;                               // on a spring; fixed otherwise
-  Mat<D, D> spring;                           // of its spring [N/mm]
+  Position<D> center;                         // of a ball that contains the obstacle [mm]
+  double radius;                              // of that ball; infinite for a wall [mm]
+  double min_curvature_radius;                // of the surface; infinite for a wall [mm]
+  double inradius;                            // of the largest ball inside; infinite for a wall [mm]
+  std::vector<Position<D>> outline;           // points of the surface, if the gap is not a distance [mm]
+  std::vector<unsigned char> touchable;       // whether each point of the robot can touch it
+  bool everywhere;                            // whether all points can
+  bool mounted;                               // on a spring; otherwise fixed
+  Mat<D, D> spring;                           // stiffness of the spring [N/mm]
 
   bool wall() const { return shape == Shape::kHalfPlane || shape == Shape::kHalfSpace; }
 };
 
-// A gap and its derivatives in the point.
+// Signed distance of a point, scaled to unit gradient on the surface, and its derivatives in the point.
 template <int D>
 struct Gap {
   double value;
   Position<D> slope;
-  std::array<double, (D * D + D) / 2> upper;  // of the symmetric second derivative, row by row
+  std::array<double, (D * D + D) / 2> upper;  // upper triangle of the Hessian, row by row
 
   Mat<D, D> curvature(double scale) const {
     Mat<D, D> out;
@@ -66,16 +66,16 @@ struct Gap {
 template <int D>
 Gap<D> measure_gap(const Obstacle<D>& obstacle, const Position<D>& point);
 
-// Gaps of several points to an obstacle that has moved, without their derivatives.
+// Writes the gaps of several points, without derivatives, to an obstacle displaced by `moved`.
 template <int D>
 void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> points, const Position<D>& moved,
                   double* gaps);
 
-// A lower bound of the distance between the nearest of several points and the obstacle.
+// Returns a lower bound on the distance of the nearest point from the obstacle.
 template <int D>
 double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> points);
 
-// How much farther than `reach` a point is at least, at most 0 when it is not.
+// Returns a lower bound on the distance of a point from the obstacle, less `reach`; at most 0 within reach.
 template <int D>
 double clearance_beyond(const Obstacle<D>& obstacle, const Position<D>& point, double reach) {
   if (obstacle.wall()) return clearance(obstacle, std::span(&point, 1)) - reach;

@@ -5,7 +5,7 @@
 
 #include "tolerances.hpp"
 
-// The generated law of the disks, inlined here.
+// The generated law of the disks' gap, inlined here.
 #define CASADI_SYMBOL_EXPORT static inline
 #include "disk_laws.c"
 
@@ -13,8 +13,8 @@ namespace ccr {
 
 namespace {
 
-// A chord d in the base frame seen by the adjoint p of the node it leads to: its moment about the lower node, where a
-// turn moves the upper one by (-dy, dx), and -p·d.
+// For the chord d of a segment and the adjoint p of its upper node: first and second derivative of p·d in the rotation
+// of the lower disk, which moves the upper node by (-dy, dx).
 template <class Bend, int N>
 double turning(const Vec<N>& p, const Bend& bend) {
   return p[1] * bend.dx - p[0] * bend.dy;
@@ -27,8 +27,8 @@ double inward(const Vec<N>& p, const Bend& bend) {
 
 }  // namespace
 
-template <class Cable>
-Planar<Cable>::Planar(const Robot& robot)
+template <class Law>
+Planar<Law>::Planar(const Robot& robot)
     : states(robot.segments + 1),
       frames(robot.segments + 1),
       gradient(robot.segments),
@@ -37,21 +37,21 @@ Planar<Cable>::Planar(const Robot& robot)
       free_bend_(1),
       adjoints_(robot.segments) {}
 
-template <class Cable>
-bool Planar<Cable>::evaluate(const Command<1>& command, const std::vector<Control>& controls) {
+template <class Law>
+bool Planar<Law>::evaluate(const Command<1>& command, const std::vector<Control>& controls) {
   const int n = robot_.segments;
   displacement_ = command.cables[0] / n;
   length_ = command.length / n;
   objective = max_objective_slope = widest = 0;
-  Cable::bend(n, controls[0].v.data(), displacement_, length_, robot_.offset, bends_);
+  Law::bend(n, controls[0].v.data(), displacement_, length_, robot_.offset, bends_);
   states[0] = {};
   frames[0] = {{1, 0}};
   for (int i = 0; i < n; ++i) {
     const auto bend = bends_[i];
-    const double c = frames[i][0], s = frames[i][1];  // of the lower disk
+    const double c = frames[i][0], s = frames[i][1];  // cosine and sine of the lower disk's angle
     const double dx = -length_ * (s * bend.forward + c * bend.sideways);
     const double dy = length_ * (c * bend.forward - s * bend.sideways);
-    bends_.place(i, dx, dy);
+    bends_.set_chord(i, dx, dy);
     frames[i + 1] = {{c * bend.cosine + s * bend.sine, s * bend.cosine - c * bend.sine}};
     State& next = states[i + 1];
     next = states[i];
@@ -66,8 +66,8 @@ bool Planar<Cable>::evaluate(const Command<1>& command, const std::vector<Contro
   return std::isfinite(objective) && !(kRod && widest > tolerances::kWidestTurn);
 }
 
-template <class Cable>
-void Planar<Cable>::adjoin(const std::vector<State>& node_forces) {
+template <class Law>
+void Planar<Law>::propagate_adjoints(const std::vector<State>& node_forces) {
   State p;
   for (int i = robot_.segments - 1; i >= 0; --i) {
     const auto bend = bends_[i];
@@ -80,8 +80,8 @@ void Planar<Cable>::adjoin(const std::vector<State>& node_forces) {
   }
 }
 
-template <class Cable>
-void Planar<Cable>::curvature(System& system) const {
+template <class Law>
+void Planar<Law>::lagrangian_hessian(System& system) const {
   for (int i = 0; i < robot_.segments; ++i) {
     const auto bend = bends_[i];
     const State& p = adjoints_[i];
@@ -107,9 +107,9 @@ void Planar<Cable>::curvature(System& system) const {
   system.node_hessian[robot_.segments] = {};
 }
 
-// With a sliding cable that is the multiplier of its slack.
-template <class Cable>
-Vec<1> Planar<Cable>::displacement_slopes() const {
+// For the rod the tension is the multiplier of the slack, and this is 0.
+template <class Law>
+Vec<1> Planar<Law>::displacement_slopes() const {
   Vec<1> slope;
   if constexpr (!kRod)
     for (int i = 0; i < robot_.segments; ++i) {
@@ -121,8 +121,8 @@ Vec<1> Planar<Cable>::displacement_slopes() const {
   return slope;
 }
 
-template <class Cable>
-DiskGap Planar<Cable>::disk_gap(int segment, int side) const requires(kRod) {
+template <class Law>
+DiskGap Planar<Law>::disk_gap(int segment, int side) const requires(kRod) {
   const double angle = side * bends_[segment].angle;
   const double* in[] = {&angle, &length_, &robot_.disk_radius, &robot_.disk_thickness};
   DiskGap gap;
@@ -132,15 +132,15 @@ DiskGap Planar<Cable>::disk_gap(int segment, int side) const requires(kRod) {
   return gap;
 }
 
-template <class Cable>
-Planar<Cable>::Control Planar<Cable>::free_control(const Command<1>& command) {
+template <class Law>
+Planar<Law>::Control Planar<Law>::free_control(const Command<1>& command) {
   if (command == free_command_) return free_control_;
   const double displacement = command.cables[0] / robot_.segments, length = command.length / robot_.segments;
   free_command_ = command;
   free_control_ = {};
   if constexpr (kRod) free_control_[0] = displacement / robot_.offset;
   for (int i = 0; i <= tolerances::kRelaxIterations; ++i) {
-    Cable::bend(1, free_control_.v.data(), displacement, length, robot_.offset, free_bend_);
+    Law::bend(1, free_control_.v.data(), displacement, length, robot_.offset, free_bend_);
     if constexpr (!kRod) {
       break;
     } else {
@@ -152,14 +152,14 @@ Planar<Cable>::Control Planar<Cable>::free_control(const Command<1>& command) {
   return free_control_;
 }
 
-// All segments have the same shape: the sums over their directions (i + 1/2) θ are taken by turning one of them on.
-template <class Cable>
-Vec<3> Planar<Cable>::free_slopes(const Command<1>& command) {
+// All segments have the same shape, with chords at angles (i + 1/2) θ, which are reached by repeated rotation.
+template <class Law>
+Vec<3> Planar<Law>::free_slopes(const Command<1>& command) {
   const int n = robot_.segments;
   const double length = command.length / n;
   free_control(command);
   const auto bend = free_bend_[0];
-  double turn, stretch = 0;  // slopes of the angle and of the logarithm of the chord
+  double turn, stretch = 0;  // derivatives of θ and of the logarithm of the chord
   if constexpr (kRod) {
     turn = 1 / (n * bend.taken_slope);
     stretch = bend.stretch * turn;

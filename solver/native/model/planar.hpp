@@ -9,44 +9,45 @@
 
 namespace ccr {
 
-// Dynamics of a segment in its lower state: the identity, and the motion of the next node per turn of the disk.
-struct Turn {
+// Derivative of the upper state of a segment in its lower one: the identity, and the motion of the upper node per
+// rotation of the lower disk.
+struct PlanarTransition {
   double x, y;
 };
 
 template <int N>
-Vec<N> times(const Turn& a, Vec<N> s) {
+Vec<N> times(const PlanarTransition& a, Vec<N> s) {
   s[0] += a.x * s[2];
   s[1] += a.y * s[2];
   return s;
 }
 
 template <int R, int N>
-Mat<R, N> times(Mat<R, N> m, const Turn& a) {
+Mat<R, N> times(Mat<R, N> m, const PlanarTransition& a) {
   for (int r = 0; r < R; ++r) m(r, 2) += m(r, 0) * a.x + m(r, 1) * a.y;
   return m;
 }
 
 template <int N, int C>
-Mat<N, C> transpose_times(const Turn& a, Mat<N, C> m) {
+Mat<N, C> transpose_times(const PlanarTransition& a, Mat<N, C> m) {
   for (int c = 0; c < C; ++c) m(2, c) += a.x * m(0, c) + a.y * m(1, c);
   return m;
 }
 
-// With one cable, that of the model `Cable` of a segment.
-template <class Cable>
+// One cable. `Law` is the model of a segment.
+template <class Law>
 class Planar {
  public:
   static constexpr int kSpace = 2, kTurn = 1, kControl = 1, kCables = 1;
-  static constexpr int kShears = 1;             // leading controls, the softest
-  static constexpr int kState = Cable::kState;  // x, y, disk angle, and with a sliding cable what is taken from it
-  static constexpr bool kRod = Cable::kRod;
-  static constexpr int kTip = 3;  // slopes of the free tip in the cable: x, y, angle
+  static constexpr int kShears = 1;           // leading controls that shear a segment
+  static constexpr int kState = Law::kState;  // x, y, disk angle; rod: cable taken
+  static constexpr bool kRod = Law::kRod;
+  static constexpr int kTip = 3;  // slopes of the free tip: x, y, angle
 
   using Control = Vec<kControl>;
   using State = Vec<kState>;
   using Frame = Vec<2>;  // direction from the backbone to the cable
-  using System = Riccati<kState, kControl, Turn>;
+  using System = Riccati<kState, kControl, PlanarTransition>;
 
   explicit Planar(const Robot& robot);
 
@@ -54,43 +55,44 @@ class Planar {
     return {{line[0] * frame[0], line[0] * frame[1]}};
   }
 
-  // Shape under a command; false when a coordinate leaves the range of the segment law.
+  // Evaluates the shape under a command; false where a control is out of range of the segment law.
   bool evaluate(const Command<1>& command, const std::vector<Control>& controls);
 
-  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each
-  // node.
-  void adjoin(const std::vector<State>& node_forces);
-  // Both follow adjoin.
-  void curvature(System& system) const;
-  Vec<1> displacement_slopes() const;  // of the Lagrangian in the cable displacement
+  // Computes the adjoints and the gradient of the Lagrangian J - Σ λ c in the controls; `node_forces` is Σ λ ∇c at
+  // each node.
+  void propagate_adjoints(const std::vector<State>& node_forces);
+  // Hessian of the Lagrangian without that of the gaps; follows propagate_adjoints.
+  void lagrangian_hessian(System& system) const;
+  Vec<1> displacement_slopes() const;  // of the Lagrangian in the displacement; follows propagate_adjoints
 
-  // The control of every segment of the robot that nothing touches, and with a sliding cable the multiplier of its
-  // slack.
+  // Control of every segment of the robot that nothing touches, and for the rod the multiplier of the slack.
   Control free_control(const Command<1>& command);
   double free_slack_multiplier() const requires(kRod) { return 2 * free_control_[0] / free_bend_[0].taken_slope; }
   Vec<kTip> free_slopes(const Command<1>& command);
 
   double slack(const Command<1>& command) const requires(kRod) { return states.back()[kState - 1] - command.cables[0]; }
-  DiskGap disk_gap(int segment, int side) const requires(kRod);  // 1 for the cable's side, -1 for the other
-  double widest_shear() const { return kRod ? HUGE_VAL : 1 - displacement_ / length_; }  // sine of it
-  double free_turn() const { return displacement_ / robot_.offset; }  // of a segment that nothing touches, about
+  DiskGap disk_gap(int segment, int side) const requires(kRod);  // side 1 is that of the cable, -1 the other
+  double widest_shear() const {
+    return kRod ? HUGE_VAL : 1 - displacement_ / length_;
+  }  // its sine, of a segment that folds over
+  double free_turn() const { return displacement_ / robot_.offset; }  // approximate angle of a free segment
   double segment_length() const { return length_; }
 
   std::vector<State> states;
   std::vector<Frame> frames;
   std::vector<Control> gradient;
   double objective = 0;
-  double max_objective_slope = 0;  // largest slope of the objective alone
+  double max_objective_slope = 0;  // of the objective alone, in a control
   double widest = 0;               // largest angle between consecutive disks
 
  private:
   Robot robot_;
-  double displacement_ = 0, length_ = 0;  // cable displacement and backbone of a segment [mm]
-  typename Cable::Bends bends_;
-  typename Cable::Bends free_bend_;  // a segment that nothing touches, relaxed under the last command asked about
+  double displacement_ = 0, length_ = 0;  // of a segment: its share of the cable, its backbone [mm]
+  typename Law::Bends bends_;
+  typename Law::Bends free_bend_;  // a free segment under the last command of free_control
   Command<1> free_command_{{{-1}}, 0};
   Control free_control_{};
-  std::vector<State> adjoints_;  // of the state each segment leads to
+  std::vector<State> adjoints_;  // of the upper state of each segment
 };
 
 }  // namespace ccr

@@ -1,11 +1,11 @@
-// The models of a segment and its cables, with their generated laws for all segments of a robot.
+// Models of a segment and its cables: their generated laws, evaluated for all segments of a robot at once.
 #pragma once
 
 #include <vector>
 
 namespace ccr {
 
-// Numbers of all segments, kept number by number so that the laws can read and write them several segments at a time.
+// Numbers of all segments, one row for each number, so that the laws read and write several segments at a time.
 class Rows {
  public:
   Rows(int numbers, int segments)
@@ -22,13 +22,13 @@ class Rows {
   }
 
  private:
-  static constexpr int kPadding = 4;  // at least the width of the lanes
+  static constexpr int kPadding = 4;  // at least the number of SIMD lanes
 
   int stride_;
   std::vector<double> values_;
 };
 
-// Bends of all segments in the plane: what the laws give, then the chord in the base frame.
+// Bends of all segments in the plane: the outputs of the law, then the chord in the base frame.
 template <class Bend>
 class Table : public Rows {
  public:
@@ -40,44 +40,44 @@ class Table : public Rows {
     return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i),  at(5, i),
             at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
   }
-  void place(int segment, double dx, double dy) {
+  void set_chord(int segment, double dx, double dy) {
     row(kLaws)[segment] = dx;
     row(kLaws + 1)[segment] = dy;
   }
 };
 
-// The cable is shared equally among the segments (the paper). A segment shears: its coordinate is σ, the sine of the
-// shear angle, and its backbone stays straight.
+// The paper's model: each segment takes an equal share of the cable. Its coordinate is σ, the sine of the shear angle;
+// its backbone stays straight.
 struct PaperLaw {
   static constexpr int kState = 3;  // x, y, disk angle
   static constexpr bool kRod = false;
 
   struct Bend {
-    double angle, slope, curvature, displacement_slope;  // θ, θ_σ, θ_σσ, θ_pull
-    double forward, sideways;                 // backbone segment from the lower disk's y axis, over its length
-    double heading_slope, heading_curvature;  // of its direction
+    double angle, slope, curvature, displacement_slope;  // θ and its derivatives in σ, σσ and the displacement
+    double forward, sideways;                 // chord along and across the lower disk's y axis, over its length
+    double heading_slope, heading_curvature;  // derivatives of its direction in σ
     double cosine, sine;                      // of θ
-    double dx, dy;                            // backbone segment in the base frame
+    double dx, dy;                            // chord in the base frame
   };
 
   using Bends = Table<Bend>;
 
-  // Fills all but dx and dy of n segments; NaN where the law has no value.
+  // Fills all but dx and dy of n segments; NaN where the law is undefined.
   static void bend(int n, const double* sines, double displacement, double length, double offset, Bends& bends);
 };
 
-// The cable slides through all disks (Rao 2024). A segment is an arc, its coordinate the angle θ between its disks;
-// what the segments take from the cable is summed up in the state, and may not be less than is pulled.
+// The discrete rod (Rao 2024): the cable slides through all disks. A segment is an arc, its coordinate the angle θ
+// between its disks. The state sums the cable taken by the segments, which must not be less than the displacement.
 struct RodLaw {
   static constexpr int kState = 4;  // x, y, disk angle, cable taken
   static constexpr bool kRod = true;
 
   struct Bend {
     double angle;                                // θ
-    double forward, sideways;                    // chord from the lower disk's y axis, over the segment's length
-    double stretch, stretch_slope;               // c'/c and c''/c of its length
+    double forward, sideways;                    // chord along and across the lower disk's y axis, over its length
+    double stretch, stretch_slope;               // c'/c and c''/c of the length c of the chord
     double cosine, sine;                         // of θ
-    double taken, taken_slope, taken_curvature;  // from the cable
+    double taken, taken_slope, taken_curvature;  // cable taken [mm]
     double dx, dy;                               // chord in the base frame
     static constexpr double slope = 1, curvature = 0, heading_slope = -0.5, heading_curvature = 0;
   };
@@ -94,15 +94,15 @@ struct SegmentInputs {
   double holes[4];          // where the pulled cables pass the disk: x, y of each [mm]
 };
 
-// Two cables in space, each shared equally among the segments. The controls of a segment are its shears and its twist;
-// the lengths of the cables give its bending.
+// The paper's model in space (eq. 13): each segment takes an equal share of both cables. Its controls are two shears
+// and the twist; the lengths of the cables determine its bending.
 struct SpatialLaw {
   static constexpr int kControl = 3, kBending = 2, kBend = 48, kAdjoint = 6, kHessian = 9;
 
-  // The bendings of n segments and what the law `ccr_bend` says of them; false where a cable cannot have its length.
+  // Finds the bendings of n segments and evaluates the law `ccr_bend`; false where a cable cannot have its length.
   static bool bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends);
 
-  // The curvatures of n segments seen by adjoints, what the law `ccr_bow` says.
+  // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_bow`.
   static void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
                                   const Rows& adjoints, Rows& hessians);
 };

@@ -1,3 +1,3 @@
-// Compiled for four doubles a register, and called where the machine has them.
+// The segment laws compiled for AVX2; called where the processor has it.
 #define CCR_SIMD avx2
 #include "model/segment_simd.inc"

@@ -52,7 +52,7 @@ bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& co
   return std::isfinite(objective);
 }
 
-void Spatial::adjoin(const std::vector<State>& node_forces) {
+void Spatial::propagate_adjoints(const std::vector<State>& node_forces) {
   Vec<3> force, moment;
   for (int i = robot_.segments - 1; i >= 0; --i) {
     const Bend& bend = bends_[i];
@@ -71,7 +71,7 @@ void Spatial::adjoin(const std::vector<State>& node_forces) {
   }
 }
 
-void Spatial::curvature(System& system) const {
+void Spatial::lagrangian_hessian(System& system) const {
   SpatialLaw::hessian_contraction(robot_.segments, inputs_, controls_, bendings_, adjoints_, hessians_);
   for (int i = 0; i < robot_.segments; ++i) {
     const Bend& bend = bends_[i];
@@ -115,20 +115,20 @@ double Spatial::free_turn() const {
   return (std::abs(inputs_.displacements[0]) + std::abs(inputs_.displacements[1])) / robot_.offset;
 }
 
-// All segments turn alike by θ, towards t with h·t = pull for both holes h and |t| = 2 sin θ/2, so that the middle of
-// segment i stands at the angle (i + 1/2) θ in the plane of t.
+// All segments bend by the same angle θ towards t, where h·t is the displacement of each hole h and |t| = 2 sin θ/2:
+// the chord of segment i is at the angle (i + 1/2) θ in the plane of t.
 Vec<10> Spatial::free_slopes(const Command<2>& command) const {
   const int n = robot_.segments;
   const double a = robot_.offset, length = command.length / n, cosine = std::cos(robot_.angle),
                sine = std::sin(robot_.angle);
-  // Slopes of t in each displacement, the same in all segments.
+  // Derivatives of t in each displacement, the same for all segments.
   const double slopes[2][2] = {{1 / (n * a), -cosine / (n * a * sine)}, {0, 1 / (n * a * sine)}};
   Vec<2> towards;
   for (int k = 0; k < 2; ++k)
     for (int c = 0; c < 2; ++c) towards[c] += command.cables[k] * slopes[k][c];
   const double size = norm(towards), angle = 2 * std::asin(size / 2), rate = 1 / std::sqrt(1 - size * size / 4);
   const double x = size > 0 ? towards[0] / size : 1, y = size > 0 ? towards[1] / size : 0;
-  double reach = 0, out = 0, fall = 0;  // of the tip in its plane, and their slopes in θ
+  double reach = 0, out = 0, fall = 0;  // reach of the tip in the plane of t; derivatives in θ of reach and height
   for (int i = 0; i < n; ++i) {
     const double middle = (i + 0.5) * angle;
     reach += length * std::sin(middle);
@@ -139,7 +139,8 @@ Vec<10> Spatial::free_slopes(const Command<2>& command) const {
   Vec<10> tip;
   for (int k = 0; k < 2; ++k) {
     const double along = slopes[k][0] * x + slopes[k][1] * y, across = slopes[k][1] * x - slopes[k][0] * y;
-    const double turn = n * rate * along, swing = swept * across;  // of the tip in its plane, and of the plane
+    const double turn = n * rate * along,
+                 swing = swept * across;  // rotation of the tip in the plane of t, and of that plane
     tip[5 * k] = out * rate * along * x - sideways * across * y;
     tip[5 * k + 1] = out * rate * along * y + sideways * across * x;
     tip[5 * k + 2] = fall * rate * along;

@@ -9,20 +9,21 @@
 
 namespace ccr {
 
-// Dynamics of a segment in its lower state: the identity, and the motion of the end of the chord as the disk turns.
-struct Sway {
+// Derivative of the upper state of a segment in its lower one: the identity, and the motion of the end of the chord
+// per rotation of the lower disk.
+struct SpatialTransition {
   Vec<3> chord;  // in the base frame
 };
 
 template <int N>
-Vec<N> times(const Sway& a, Vec<N> s) {
+Vec<N> times(const SpatialTransition& a, Vec<N> s) {
   const Vec<3> motion = cross({{s[3], s[4], s[5]}}, a.chord);
   for (int k = 0; k < 3; ++k) s[k] += motion[k];
   return s;
 }
 
 template <int R, int N>
-Mat<R, N> times(Mat<R, N> m, const Sway& a) {
+Mat<R, N> times(Mat<R, N> m, const SpatialTransition& a) {
   for (int r = 0; r < R; ++r) {
     const Vec<3> moment = cross(a.chord, {{m(r, 0), m(r, 1), m(r, 2)}});
     for (int k = 0; k < 3; ++k) m(r, 3 + k) += moment[k];
@@ -31,7 +32,7 @@ Mat<R, N> times(Mat<R, N> m, const Sway& a) {
 }
 
 template <int N, int C>
-Mat<N, C> transpose_times(const Sway& a, Mat<N, C> m) {
+Mat<N, C> transpose_times(const SpatialTransition& a, Mat<N, C> m) {
   for (int c = 0; c < C; ++c) {
     const Vec<3> moment = cross(a.chord, {{m(0, c), m(1, c), m(2, c)}});
     for (int k = 0; k < 3; ++k) m(3 + k, c) += moment[k];
@@ -39,20 +40,21 @@ Mat<N, C> transpose_times(const Sway& a, Mat<N, C> m) {
   return m;
 }
 
-// With two cables, each of which is shared equally among the segments, and lies opposite where its displacement is
-// negative. The controls of a segment are its shears and its twist; the cables give its bending.
+// Two pairs of cables: a negative displacement pulls the cable on the opposite side. The controls of a segment are two
+// shears and the twist; the cables determine its bending.
 class Spatial {
  public:
   static constexpr int kSpace = 3, kTurn = 3, kControl = 3, kCables = 2;
-  static constexpr int kState = 6;  // place, and small turn about the axes of the base frame
+  static constexpr int kState = 6;  // position, and small rotation about the axes of the base frame
   static constexpr bool kRod = false;
-  static constexpr int kShears = 2;  // leading controls, the softest
-  static constexpr int kTip = 10;    // slopes of the free tip in each cable: place, and turn towards both cables
+  static constexpr int kShears = 2;  // leading controls that shear a segment
+  static constexpr int kTip =
+      10;  // slopes of the free tip in each displacement: position, and rotation towards both cables
 
   using Control = Vec<kControl>;
   using State = Vec<kState>;
-  using Frame = Mat<3, 3>;  // axes of the disk, its columns
-  using System = Riccati<kState, kControl, Sway>;
+  using Frame = Mat<3, 3>;  // its columns are the axes of the disk
+  using System = Riccati<kState, kControl, SpatialTransition>;
 
   explicit Spatial(const Robot& robot);
 
@@ -62,30 +64,30 @@ class Spatial {
     return lever;
   }
 
-  // Shape under a command; false where the cables cannot have their lengths.
+  // Evaluates the shape under a command; false where the cables cannot have their lengths.
   bool evaluate(const Command<2>& command, const std::vector<Control>& controls);
 
-  // Slope of the Lagrangian, the adjoints of whose other part than the objective start from the node_forces on each
-  // node.
-  void adjoin(const std::vector<State>& node_forces);
-  // Both follow adjoin.
-  void curvature(System& system) const;
-  Vec<2> displacement_slopes() const;  // of the Lagrangian in the size of the cable displacements
+  // Computes the adjoints and the gradient of the Lagrangian J - Σ λ c in the controls; `node_forces` is Σ λ ∇c at
+  // each node.
+  void propagate_adjoints(const std::vector<State>& node_forces);
+  // Hessian of the Lagrangian without that of the gaps; follows propagate_adjoints.
+  void lagrangian_hessian(System& system) const;
+  Vec<2> displacement_slopes() const;  // of the Lagrangian in the size of each displacement; follows propagate_adjoints
 
   Vec<kTip> free_slopes(const Command<2>& command) const;
 
-  double widest_shear() const { return 1; }  // sine of it
-  double free_turn() const;                  // of a segment that nothing touches, about
+  double widest_shear() const { return 1; }  // its sine, of a segment that folds over
+  double free_turn() const;                  // approximate angle of a free segment
   double segment_length() const { return inputs_.length; }
 
   std::vector<State> states;
   std::vector<Frame> frames;
   std::vector<Control> gradient;
   double objective = 0;
-  double max_objective_slope = 0;  // largest slope of the objective alone
+  double max_objective_slope = 0;  // of the objective alone, in a control
 
  private:
-  // What the law of a segment gives, in the frame of its lower disk.
+  // Outputs of the segment law, in the frame of the lower disk.
   struct Bend {
     Vec<3> chord;
     Mat<3, 3> rotation;
@@ -105,7 +107,7 @@ class Spatial {
   Rows controls_, bendings_, laws_, adjoints_;
   mutable Rows hessians_;
   std::vector<Bend> bends_;
-  std::vector<Vec<3>> forces_, moments_;  // adjoints of the state each segment leads to, in its lower disk's frame
+  std::vector<Vec<3>> forces_, moments_;  // adjoints of the upper state of each segment, in its lower disk's frame
 };
 
 }  // namespace ccr

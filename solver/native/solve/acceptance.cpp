@@ -87,9 +87,9 @@ bool ModelContinuation<Model>::left_branch(const Command& command, double moved,
   if (command.length == present_.command.length) {
     double unevenness = 0;  // work that a tension which does not change linearly may add or take
     for (int k = 0; k < kCables; ++k)
-      unevenness +=
-          std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
-          (kUneven * std::abs(trial_tensions_[k] - tensions_[k]) + kLost * std::max(tensions_[k], trial_tensions_[k]));
+      unevenness += std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
+                    (kUnevenChange * std::abs(trial_tensions_[k] - tensions_[k]) +
+                     kUnevenTension * std::max(tensions_[k], trial_tensions_[k]));
     if (std::abs(loss) * problem_.energy_scale() <= unevenness) return false;
   }
   return !way_back_returns();

@@ -26,7 +26,7 @@ ActiveSetQp<Model>::Load ActiveSetQp<Model>::linearize_gap(const ContactProblem&
   return {&slopes_[j], &responses_[j]};
 }
 
-// What the penalty on the active gaps adds to a step while they are not closed.
+// Adds the gradient of the penalty on open active gaps, -penalty c H⁻¹∇c.
 template <class Model>
 void ActiveSetQp<Model>::add_penalty_response(const ContactProblem& problem, const ActiveSet& active,
                                               Direction& step) const {
@@ -34,7 +34,7 @@ void ActiveSetQp<Model>::add_penalty_response(const ContactProblem& problem, con
     if (penalties_[j] != 0) step.add(-penalties_[j] * problem.gaps()[active.contact[j]], responses_[j]);
 }
 
-// Takes a contact out, with its slope and response; `responses` counts those in use.
+// Removes a contact with its gradient and response. `responses` is the number of responses in use.
 template <class Model>
 void ActiveSetQp<Model>::remove_contact(ActiveSet& active, int j, int responses) {
   std::rotate(slopes_.begin() + j, slopes_.begin() + j + 1, slopes_.begin() + responses);
@@ -43,7 +43,7 @@ void ActiveSetQp<Model>::remove_contact(ActiveSet& active, int j, int responses)
   active.drop(j);
 }
 
-// Cholesky factor of ∇cᵀH⁻¹∇c over the active gaps; false where they depend on each other.
+// Cholesky factor of ∇cᵀH⁻¹∇c over the active gaps; false where they are linearly dependent.
 template <class Model>
 bool ActiveSetQp<Model>::factor_gram(const ActiveSet& active) {
   for (int j = 0; j < active.count; ++j)
@@ -58,7 +58,7 @@ bool ActiveSetQp<Model>::factor_gram(const ActiveSet& active) {
 }
 
 template <class Model>
-void ActiveSetQp<Model>::solve_gram(int count, Column& x) const {
+void ActiveSetQp<Model>::solve_gram(int count, Multipliers& x) const {
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < i; ++k) x[i] -= gram_[i][k] * x[k];
     x[i] /= gram_[i][i];
@@ -69,33 +69,33 @@ void ActiveSetQp<Model>::solve_gram(int count, Column& x) const {
   }
 }
 
-// Change of the multipliers that closes the active gaps.
+// Change of the multipliers for which c + ∇c·d = 0 on the active set.
 template <class Model>
-ActiveSetQp<Model>::Column ActiveSetQp<Model>::closing_multipliers(const ContactProblem& problem,
-                                                                   const ActiveSet& active,
-                                                                   const Direction& step) const {
-  Column change;
+ActiveSetQp<Model>::Multipliers ActiveSetQp<Model>::closing_multipliers(const ContactProblem& problem,
+                                                                        const ActiveSet& active,
+                                                                        const Direction& step) const {
+  Multipliers change;
   for (int j = 0; j < active.count; ++j) change[j] = -problem.gaps()[active.contact[j]] - along(j, step);
   solve_gram(active.count, change);
   return change;
 }
 
 template <class Model>
-void ActiveSetQp<Model>::apply(const Column& change, ActiveSet& active, Direction& step) const {
+void ActiveSetQp<Model>::apply(const Multipliers& change, ActiveSet& active, Direction& step) const {
   for (int j = 0; j < active.count; ++j) {
     active.multiplier[j] += change[j];
     step.add(change[j], responses_[j]);
   }
 }
 
-// Closes the active gaps, releasing those whose multiplier would turn negative.
+// Closes the active gaps; where λ + Δλ < 0 for any, removes the lowest and tries again.
 template <class Model>
 void ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step) {
   while (active.count > 0) {
     int lowest;
     const auto begin = active.multiplier.begin(), end = begin + active.count;
     if (factor_gram(active)) {
-      const Column change = closing_multipliers(problem, active, step);
+      const Multipliers change = closing_multipliers(problem, active, step);
       lowest = 0;
       for (int j = 1; j < active.count; ++j)
         if (begin[j] + change[j] < begin[lowest] + change[lowest]) lowest = j;
@@ -111,7 +111,8 @@ void ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem
   }
 }
 
-// Adds a violated gap by dual steps: its multiplier grows until it is closed, releasing whatever turns negative.
+// Adds a violated gap by dual steps: its multiplier grows until the gap is closed. A step that would make another
+// multiplier negative ends where that is 0, and removes it. False where the gaps have no common solution.
 template <class Model>
 bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active,
                                           Direction& step) {
@@ -124,7 +125,7 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
     const int count = active.count;
     const Direction& response = responses_[count];
     if (!factor_gram(active)) return false;
-    Column coupling, trade;
+    Multipliers coupling, trade;
     for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(j, response);
     solve_gram(count, trade);
     const double full = along(count, response);
@@ -162,7 +163,7 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
 template <class Model>
 int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const ActiveSet& active,
                                       const Direction& step) const {
-  double reach = 0;  // of any point under the step
+  double reach = 0;  // bound on the motion of any point
   for (const auto& d : step.states) {
     double motion = 0, turn = 0;
     for (int k = 0; k < Model::kSpace; ++k) motion += std::abs(d[k]);

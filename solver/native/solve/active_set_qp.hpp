@@ -1,4 +1,4 @@
-// The quadratic subproblem of Newton's method: which linearised gaps carry a multiplier, and the step they allow.
+// The quadratic program of a Newton step: minimise ½ dᵀH d + gᵀd subject to c + ∇c·d >= 0.
 #pragma once
 
 #include <array>
@@ -9,7 +9,8 @@
 
 namespace ccr {
 
-// Dual active-set method: every intermediate point minimises the model on its active set with multipliers >= 0.
+// Dual active-set method (Goldfarb and Idnani): every intermediate step minimises the model on its active set, with
+// multipliers λ >= 0, and violated gaps are added one by one.
 template <class Model>
 class ActiveSetQp {
  public:
@@ -19,19 +20,19 @@ class ActiveSetQp {
 
   ActiveSetQp(int segments, int mounts);
 
-  // The step that minimises the model at `problem` within every linearised gap. On entry `active` holds the present
-  // multipliers, which are part of the slope of the model; on success it is the new active set.
+  // Finds the step that minimises the model subject to all linearised gaps. On entry `active` holds the multipliers
+  // that the gradient contains; on success it is the active set of the solution. False where no step was found.
   bool solve(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
-  // The smallest step, measured by the Hessian, that closes the active gaps, which are held, and meets every other.
+  // Finds the smallest step in the norm of H that closes the active gaps, as equalities, and satisfies all others.
   bool restore(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
-  // A further step from a point close by, on the same active set and with the curvature and responses of the last
-  // solve. False when a multiplier would turn negative.
+  // Finds a further step near the last solve, on its active set and with its factorisation. False where a multiplier
+  // would be negative.
   bool correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
  private:
-  using Column = std::array<double, tolerances::kMaxActive>;
+  using Multipliers = std::array<double, tolerances::kMaxActive>;
   using Load = typename KktSystem::Load;
 
   double along(int j, const Direction& d) const { return slopes_[j].along(d); }
@@ -39,20 +40,20 @@ class ActiveSetQp {
   void add_penalty_response(const ContactProblem& problem, const ActiveSet& active, Direction& step) const;
   void remove_contact(ActiveSet& active, int j, int responses);
   bool factor_gram(const ActiveSet& active);
-  void solve_gram(int count, Column& x) const;
+  void solve_gram(int count, Multipliers& x) const;
   void drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step);
   bool satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
-  Column closing_multipliers(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const;
-  void apply(const Column& change, ActiveSet& active, Direction& step) const;
+  Multipliers closing_multipliers(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const;
+  void apply(const Multipliers& change, ActiveSet& active, Direction& step) const;
   bool add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active, Direction& step);
   int most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const;
 
-  // Of the active gaps in their order, then of one that is being admitted.
+  // Of the active gaps in their order, then of the one that is being added.
   std::vector<typename ContactProblem::Slope> slopes_;
-  std::vector<double> penalties_;     // in the curvature
+  std::vector<double> penalties_;     // contained in H
   std::vector<Direction> responses_;  // H⁻¹∇c
   std::vector<Load> loads_;
-  std::array<Column, tolerances::kMaxActive> gram_;
+  std::array<Multipliers, tolerances::kMaxActive> gram_;
 };
 
 }  // namespace ccr

@@ -45,7 +45,7 @@ bool ContactProblem<Model>::out_of_reach(int obstacle, double motion) const {
   return clear_[obstacle] > drift_ + motion;
 }
 
-// Far from an obstacle, so many nodes are passed over as cannot come within reach of it.
+// At a distance from an obstacle, skips the next nodes, which are too close to this one to be within reach.
 template <class Model>
 void ContactProblem<Model>::measure_gaps() {
   const int n = robot_.segments, stride = robot_.between + 1;

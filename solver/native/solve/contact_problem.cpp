@@ -57,7 +57,7 @@ bool ContactProblem<Model>::evaluate(const Iterate& at) {
   return true;
 }
 
-// Half of kFence times the square by which the squared shear, over its limit's, exceeds kFenceShear.
+// The barrier is kFence/2 · max(0, s - kFenceShear)², s the squared shear over that of a segment that folds over.
 template <class Model>
 void ContactProblem<Model>::raise_fence(const std::vector<Control>& controls) {
   fence_slope_.assign(controls.size(), {});
@@ -129,7 +129,7 @@ template <class Model>
 ContactProblem<Model>::Slope ContactProblem<Model>::slope(int contact) const {
   if constexpr (Model::kRod) {
     if (contact == slack_contact()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
-    if (contact > slack_contact()) {  // in the angle between two nodes
+    if (contact > slack_contact()) {  // a function of the angle between two nodes
       const double slope = disk_gap(contact).slope;
       return {{(contact - first_disk_contact()) / 2, true, {{0, 0, slope, 0}}, {{0, 0, -slope, 0}}}, -1, {}};
     }
@@ -175,9 +175,9 @@ double ContactProblem<Model>::violation() const {
 }
 
 template <class Model>
-double ContactProblem<Model>::tolerance(const ActiveSet& active) const {
+double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) const {
   const double scale = Model::kRod ? model_.max_objective_slope : model_.free_turn() * model_.free_turn();
-  double pressed = model_.max_objective_slope;  // also by contacts
+  double pressed = model_.max_objective_slope;  // largest slope, of the objective or of a contact
   for (int j = 0; j < active.count; ++j)
     pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));
   return tolerances::kStationarity * scale + tolerances::kRoundoff * pressed;
@@ -196,25 +196,26 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
       if (force.split) node_forces_[force.node + 1][k] += active.multiplier[j] * force.next[k];
     }
   }
-  model_.adjoin(node_forces_);
+  model_.propagate_adjoints(node_forces_);
   if (at_fence())
     for (std::size_t i = 0; i < fence_slope_.size(); ++i) model_.gradient[i] += fence_slope_[i];
 }
 
 template <class Model>
 void ContactProblem<Model>::lagrangian_hessian(const ActiveSet& active, System& system) const {
-  model_.curvature(system);
+  model_.lagrangian_hessian(system);
   if (at_fence())
     for (std::size_t i = 0; i < fence_curvature_.size(); ++i) system.stages[i].huu += fence_curvature_[i];
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     if constexpr (Model::kRod)
       if (contact > slack_contact()) add_disk_curvature(contact, -active.multiplier[j], system);
-    if (contact >= contacts()) continue;  // slack is linear in the state
+    if (contact >= contacts()) continue;  // the slack is linear in the state
     const Gap<kSpace> gap = this->gap(contact);
     const Site& site = this->site(contact);
     const double scale = -active.multiplier[j];
-    // Its Hessian in the states of the nodes beside it: J_aᵀ C J_b, and the curvature of the turn of each lever.
+    // -λ∇²c in the states of the nodes beside the point: J_aᵀ C J_b, and the second derivative of each lever's
+    // rotation.
     const auto motion = [&](double weight, int node) {
       Mat<kSpace, kState> slope;
       const auto turn = swing(lever(site, node));

@@ -1,4 +1,5 @@
-// A robot among obstacles at one trial shape: its points and their gaps beside what its model says.
+// The nonlinear program of an equilibrium, evaluated at a trial shape: minimise the energy J of robot and springs
+// subject to gaps c >= 0 of its points.
 #pragma once
 
 #include <array>
@@ -12,9 +13,9 @@
 
 namespace ccr {
 
-// ActiveSetQp that carry a multiplier. A contact is (obstacle * lines + line) * positions + position. After the last of
-// these come, with a sliding cable, its slack, and of each segment where its disks meet on the side of the cable and
-// opposite.
+// Contacts in the active set and their multipliers λ >= 0. The index of a contact with an obstacle is
+// (obstacle * lines + line) * positions + position. For the rod, the slack of the cable follows, then two contacts of
+// the disks of each segment: on the side of the cable, and opposite.
 struct ActiveSet {
   int count = 0;
   std::array<int, tolerances::kMaxActive> contact;
@@ -29,7 +30,7 @@ struct ActiveSet {
   }
 };
 
-// A shape and what holds it: coordinates of the segments, displacements of the mounted obstacles, contacts that push.
+// Unknowns of the program: controls of the segments, displacements of the mounts, and the active set.
 template <class Model>
 struct Iterate {
   Command<Model::kCables> command{};
@@ -38,7 +39,7 @@ struct Iterate {
   ActiveSet active;
 };
 
-// The points of all lines.
+// Writes the points of all lines, by line and position.
 template <class Model>
 void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> nodes,
                   std::span<const typename Model::Frame> frames, std::vector<Position<Model::kSpace>>& points);
@@ -58,11 +59,11 @@ class ContactProblem {
   using Force = typename System::Force;
   using Tensions = Vec<Model::kCables>;
 
-  // Of a gap in the states of the nodes beside its point, and in the displacement of the mount it is on, which is
-  // that of the point with the opposite sign.
+  // Gradient of a gap in the states of the nodes beside its point and, with the opposite sign of that in the point, in
+  // the displacement of its mount.
   struct Slope {
     Force force;
-    int mount;  // -1 for an obstacle that is fixed
+    int mount;  // -1 for a fixed obstacle
     Position normal;
 
     template <class Direction>
@@ -71,72 +72,73 @@ class ContactProblem {
     }
   };
 
-  // For scenes of this many obstacles.
+  // `obstacles` is the number of obstacles of every scene.
   ContactProblem(const Robot& robot, int obstacles);
 
-  // Goes among the obstacles of a scene, which must stay where they are while the problem is.
+  // Switches to another scene with the same number of obstacles. The span must outlive its use.
   void set_obstacles(std::span<const Obstacle> obstacles);
 
-  // Measures how far each obstacle is from a shape, so that it can be passed over while the robot stays close to it.
+  // Measures the distance of each obstacle from a shape, so that it is skipped while the robot stays close to that
+  // shape.
   void update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts);
 
-  // Shape under the command; false when a coordinate leaves the range of the segment law.
+  // Evaluates energy, points and gaps; false where a control is out of range of the segment law.
   bool evaluate(const Iterate& at);
 
-  // Adds energy, while `on`, to segments that shear so far that they come near to folding over, which no equilibrium of
-  // interest does but a descent may pass through.
+  // While `on`, adds a barrier energy to segments that come near to folding over, which no equilibrium of interest does
+  // but a descent might.
   void fence(bool on) { fenced_ = on; }
-  bool at_fence() const { return fence_energy_ > 0; }  // of the last shape
+  bool at_fence() const { return fence_energy_ > 0; }  // whether a segment of the last shape is in the barrier
 
-  // The shape that no obstacle touches, which is known, and what holds it.
+  // Sets the equilibrium of the robot that nothing touches, which is known in closed form.
   void set_free_shape(Iterate& at);
 
-  // Slope of the Lagrangian J - Σ λ c with respect to the controls, with the adjoints it is made of.
+  // Computes the gradient of the Lagrangian J - Σ λ c in controls and mounts.
   void reduced_gradient(const ActiveSet& active);
-  // Exact Hessian of the Lagrangian, and the tensions of the cables; both follow reduced_gradient.
+  // Exact Hessian of the Lagrangian, and the tensions of the cables [N]; both follow reduced_gradient.
   void lagrangian_hessian(const ActiveSet& active, System& system) const;
   Tensions tensions(const ActiveSet& active) const;
-  Position contact_force(const ActiveSet& active, int obstacle) const;  // its force on the robot [N]
-  Position mount_load(const ActiveSet& active, int mount) const;        // Σ λ ∇c of the contacts on a mount
+  Position contact_force(const ActiveSet& active, int obstacle) const;  // of an obstacle on the robot [N]
+  Position mount_load(const ActiveSet& active, int mount) const;        // Σ λ ∇c over the contacts with a mount
 
-  // Slopes of the tip of a robot that nothing touches in the cable displacements (eq. 7).
+  // Derivatives of the free robot's tip in the displacements (eq. 7).
   auto free_slopes(const Command& command) { return model_.free_slopes(command); }
 
   const Robot& robot() const { return robot_; }
   std::span<const Obstacle> obstacles() const { return obstacles_; }
-  // ActiveSetQp with obstacles, then the slack of a sliding cable, then the first of the disks that meet.
+  // Number of contacts with obstacles; the slack of the rod's cable is the next index, then its disks.
   int contacts() const { return static_cast<int>(mount_of_.size() * points_.size()); }
-  bool touches_obstacle(const ActiveSet& active) const;  // any obstacle
+  bool touches_obstacle(const ActiveSet& active) const;  // whether any is with an obstacle
 
   double objective() const { return model_.objective; }
-  double energy() const { return energy_; }  // the objective and that of the springs, over the energy scale [rad^2]
-  double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the energy scale [rad^2]
-  double violation() const;                                                        // largest -gap, at least 0
-  double tolerance(const ActiveSet& active) const;                                 // of the slope of the Lagrangian
+  double energy() const { return energy_; }  // J: objective and springs, over the energy scale [rad²]
+  double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the energy scale [rad²]
+  double violation() const;                                                        // max(0, -c) over all gaps [mm]
+  double stationarity_tolerance(const ActiveSet& active) const;  // of the gradient of the Lagrangian [rad²]
   double energy_scale() const { return robot_.energy_scale(model_.segment_length() * robot_.segments); }
   const std::vector<State>& states() const { return model_.states; }
   const std::vector<Frame>& frames() const { return model_.frames; }
-  const std::vector<Position>& points() const { return points_; }  // (line, position)
-  // ActiveSetQp within reach, and the gap of every contact, infinite for those that are not.
+  const std::vector<Position>& points() const { return points_; }  // by line and position [mm]
+  // Contacts within reach, and the gap of every contact, infinite out of reach [mm].
   const std::vector<int>& near_contacts() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
-  bool out_of_reach(int obstacle, double motion) const;      // from any point, even after such a motion
-  void all_gaps(double* gaps) const;                         // of every contact, whether within reach or not
-  Gap<kSpace> gap(int contact) const;                        // with its derivatives in the point
-  Force force(int contact, const Position& on_point) const;  // on the nodes, of one on the point
+  bool out_of_reach(int obstacle, double motion) const;      // of all points, even after such a motion
+  void all_gaps(double* gaps) const;                         // of every contact, within reach or not
+  Gap<kSpace> gap(int contact) const;                        // with derivatives in the point
+  Force force(int contact, const Position& on_point) const;  // on the nodes, equivalent to one on the point
   Slope slope(int contact) const;
   int mounts() const { return static_cast<int>(springs_.size()); }
   int mount(int contact) const { return contact >= contacts() ? -1 : mount_of_[contact / points_.size()]; }
   int mount_of(int obstacle) const { return mount_of_[obstacle]; }
-  const Mat<kSpace, kSpace>& spring(int mount) const { return springs_[mount]; }  // its stiffness over the robot's
+  const Mat<kSpace, kSpace>& spring(int mount) const { return springs_[mount]; }  // stiffness over the energy scale
   const std::vector<Position>& mount_gradient() const { return mount_gradient_; }
   int slack_contact() const { return contacts(); }
   int first_disk_contact() const { return contacts() + 1; }
-  double lever_arm(int contact) const;  // of its motion per unit of a control, about [mm]
+  double lever_arm(int contact) const;  // approximate derivative of the gap in a control [mm]
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
  private:
-  // Where a point is: this fraction of the way from a node to the next, at this place on the disks.
+  // Location of a point: a fraction of the way from a node to the next, on a line across the disks.
   struct Site {
     int node;
     double fraction;
@@ -162,22 +164,22 @@ class ContactProblem {
   Robot robot_;
   Model model_;
   std::span<const Obstacle> obstacles_;
-  double reach_ = 0;  // from a node, within which its points may be near an obstacle
+  double reach_ = 0;  // distance of a node from an obstacle within which its points are measured
   double energy_ = 0;
   bool fenced_ = false;
   double fence_energy_ = 0;
-  std::vector<Control> fence_slope_;  // (segments), while fenced
+  std::vector<Control> fence_slope_;  // of each segment
   std::vector<Mat<Model::kControl, Model::kControl>> fence_curvature_;
-  std::vector<Position> origin_;        // nodes of the shape looked around from
+  std::vector<Position> origin_;        // nodes of the shape of the broad phase
   std::vector<Position> mount_origin_;  // mounts of that shape
-  std::vector<double> clear_;           // how far its nodes may move before an obstacle is within reach
-  double drift_ = 0;                    // how far they have
+  std::vector<double> clear_;           // of each obstacle: motion of the nodes before it is within reach
+  double drift_ = 0;                    // largest motion of a node from that shape
   std::vector<Position> nodes_;
   std::vector<Position> points_;
   std::vector<Site> sites_;  // of the points
   std::vector<double> gaps_;
   std::vector<int> near_;
-  std::vector<int> mount_of_;                 // obstacle, -1 for a fixed one
+  std::vector<int> mount_of_;                 // of each obstacle, -1 for a fixed one
   std::vector<Mat<kSpace, kSpace>> springs_;  // of the mounts
   std::vector<Position> displacements_;       // of the mounts
   std::vector<Position> mount_gradient_;

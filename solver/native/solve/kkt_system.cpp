@@ -69,8 +69,8 @@ void KktSystem<Model>::assemble(const ContactProblem& problem, const ActiveSet& 
   assemble_mounts(problem, active);
 }
 
-// A point on a mounted obstacle has the Hessian -λ∇²c + penalty ∇c∇cᵀ in its place; so has the mount, and the two of
-// them together the opposite.
+// A contact with a mount has the Hessian -λ∇²c + penalty ∇c∇cᵀ in the point, the same in the mount, and its negative
+// between them.
 template <class Model>
 void KktSystem<Model>::assemble_mounts(const ContactProblem& problem, const ActiveSet& active) {
   touched_ = 0;
@@ -134,7 +134,8 @@ bool KktSystem<Model>::factor_mounts(double damping) {
   return true;
 }
 
-// From the response of the problem alone, and the load of the mounts in their place, to that of all together.
+// Completes the response of the chain alone, with the right-hand side of the mounts in `response.mounts`, to that of
+// all unknowns.
 template <class Model>
 void KktSystem<Model>::couple_mounts(Direction& response) {
   for (int a = 0; a < touched_; ++a) {

@@ -1,5 +1,5 @@
-// The Hessian of the Lagrangian in all unknowns, factored: the controls of the segments by the Riccati recursion, the
-// displacements of the mounted obstacles by the Schur complement that is left.
+// The KKT system of Newton's method: the Hessian of the Lagrangian, factored by the Riccati recursion in the controls
+// of the segments and by a Schur complement in the displacements of the mounts.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +29,7 @@ class KktSystem {
   using Direction = ccr::Direction<Model>;
   using Slope = typename ContactProblem::Slope;
 
-  // Something to respond to, a slope of a gap or else that of the Lagrangian at the problem, and where its response
-  // goes.
+  // A right-hand side, the gradient of a gap or, where that is null, of the Lagrangian, and what receives the solution.
   struct Load {
     const Slope* gap;
     Direction* response;
@@ -38,16 +37,17 @@ class KktSystem {
 
   KktSystem(int segments, int mounts);
 
-  // Takes the curvature at a shape, with a penalty on each active gap of this strength over the largest curvature.
+  // Assembles the Hessian at the problem's shape, with a penalty on each active gap: `strength` times the largest
+  // curvature of a control.
   void assemble(const ContactProblem& problem, const ActiveSet& active, double strength);
-  // True exactly when it is positive definite, with this damping of all unknowns.
+  // Factors it plus `damping` on all unknowns; false unless positive definite.
   bool factor(double damping);
-  // H⁻¹ times the slope of a gap, or -H⁻¹ times that of the Lagrangian.
+  // Solves for several right-hand sides: H⁻¹ times the gradient of a gap, or -H⁻¹ times that of the Lagrangian.
   void solve(const ContactProblem& problem, std::span<const Load> loads);
 
   std::int64_t factorizations = 0;                         // so far
-  double penalty(int j) const { return penalty_[j]; }      // on an active gap, in their order
-  double max_curvature() const { return max_curvature_; }  // largest curvature of a control
+  double penalty(int j) const { return penalty_[j]; }      // on the j-th active gap
+  double max_curvature() const { return max_curvature_; }  // of a shear
 
  private:
   static constexpr int kSpace = Model::kSpace;
@@ -55,7 +55,8 @@ class KktSystem {
   using System = typename Model::System;
   using Force = typename System::Force;
 
-  // One of the directions a touched mount can move in: the forces that puts on the problem, and its response.
+  // The coupling of one direction of a touched mount: its column of the Hessian, as forces on the nodes, and the
+  // chain's response.
   struct Column {
     int mount, axis;
     std::vector<Force> forces;
@@ -68,13 +69,13 @@ class KktSystem {
 
   System system_;
   std::vector<double> penalty_;
-  std::vector<Mat<kSpace, kSpace>> mount_hessian_, mount_factor_;  // of each mount by itself
+  std::vector<Mat<kSpace, kSpace>> mount_hessian_, mount_factor_;  // of each mount, without the chain
   std::vector<Column> columns_;
-  int touched_ = 0;            // columns in use
-  std::vector<double> schur_;  // Cholesky factor, (touched, touched)
-  std::vector<double> moves_;  // of the touched columns
+  int touched_ = 0;            // number of columns in use
+  std::vector<double> schur_;  // Cholesky factor of the Schur complement, (touched, touched)
+  std::vector<double> moves_;  // solution in these columns
   double max_curvature_ = 0;
-  double arm_ = 1;  // turns the damping of a control into that of a displacement [mm]
+  double arm_ = 1;  // lever that converts damping of controls to damping of mounts [mm]
   std::vector<typename System::Load> loads_;
 };
 

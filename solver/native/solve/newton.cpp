@@ -39,10 +39,11 @@ bool Newton<Model>::is_equilibrium(const ActiveSet& active) const {
     for (const double slope : g.v) worst = std::max(worst, std::abs(slope));
   const double arm = problem.robot().max_length / problem.robot().segments;
   for (const auto& g : problem.mount_gradient()) worst = std::max(worst, arm * norm(g));
-  return worst <= problem.tolerance(active) && gaps_closed(active, kFeasibility);
+  return worst <= problem.stationarity_tolerance(active) && gaps_closed(active, kFeasibility);
 }
 
-// Exact curvature where it is positive; else a penalty on the active gaps, which leaves the solution where it is.
+// Factors the exact Hessian; where that fails, with a growing penalty on the active gaps, which leaves the solution
+// unchanged and succeeds if H is positive definite on their tangent space.
 template <class Model>
 bool Newton<Model>::factor_penalized(const ActiveSet& active, int penalties) {
   damping_ = 0;
@@ -54,18 +55,19 @@ bool Newton<Model>::factor_penalized(const ActiveSet& active, int penalties) {
   return false;
 }
 
-// Else damping, which only shortens the way there; tried from a little less than what was needed last.
+// The same, with damping as the last resort: it shortens the step.
 template <class Model>
 bool Newton<Model>::factor_convexified(const ActiveSet& active, int penalties) {
   return factor_penalized(active, penalties) || factor_damped();
 }
 
+// Factors with growing damping, from a little less than was needed last.
 template <class Model>
 bool Newton<Model>::factor_damped() {
-  damping_ = std::max(kDamping * kkt_.max_curvature(), needed_ / (kDampingGrowth * kDampingGrowth));
+  damping_ = std::max(kDamping * kkt_.max_curvature(), needed_damping_ / (kDampingGrowth * kDampingGrowth));
   for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
     if (kkt_.factor(damping_)) {
-      needed_ = damping_;
+      needed_damping_ = damping_;
       return true;
     }
   return false;
@@ -100,7 +102,7 @@ void advance(const Iterate<Model>& from, double scale, const Direction<Model>& s
     for (int k = 0; k < Model::kSpace; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
 }
 
-// Multipliers a fraction of the way from one set to another.
+// Interpolates multipliers from one active set to another, at a fraction of the step.
 void blend(const ActiveSet& from, double scale, ActiveSet& to) {
   if (scale == 1) return;
   for (int j = 0; j < to.count; ++j) {
@@ -113,8 +115,9 @@ void blend(const ActiveSet& from, double scale, ActiveSet& to) {
 
 }  // namespace
 
-// Length of the step that lowers the l1 merit, with the problem evaluated there as `trial_`; 0 when there is none.
-// Close to the solution the curvature of the gaps makes the merit reject good steps: Newton is trusted there.
+// Returns the length of step that lowers the l1 merit sufficiently (Armijo), with the problem evaluated there as
+// `trial_`; 0 where there is none. Small steps are taken whole: near the solution the curvature of the gaps makes the
+// merit reject good steps (Maratos effect).
 template <class Model>
 double Newton<Model>::line_search(const Iterate& at, const ActiveSet& target, double& weight) {
   trial_.command = at.command;
@@ -144,8 +147,8 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
   double weight = 0;
-  bool close = false, stable = true;  // the last curvature along the active gaps
-  needed_ = 0;
+  bool close = false, stable = true;  // whether the last H was positive definite on their tangent space
+  needed_damping_ = 0;
   for (; result.iterations <= kNewtonIterations; ++result.iterations) {
     problem.reduced_gradient(at.active);
     if (is_equilibrium(at.active)) {
@@ -153,7 +156,7 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
       return result;
     }
     ActiveSet target = at.active;
-    if (close) {  // the last curvature still serves
+    if (close) {  // the last factorisation serves once more
       close = false;
       if (qp_.correct(problem, kkt_, target, step_)) {
         advance(at, 1, step_, at);
@@ -181,13 +184,13 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
 
 template <class Model>
 bool Newton<Model>::set_metric(const Iterate& at) {
-  needed_ = 0;
+  needed_damping_ = 0;
   stretch_ = kStretch;
   creeping_ = false;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
   return factor_convexified(at.active, kDescentPenalties) &&
-         kkt_.factor(damping_ + kMeasureDamping * kkt_.max_curvature());
+         kkt_.factor(damping_ + kNormDamping * kkt_.max_curvature());
 }
 
 template <class Model>
@@ -204,7 +207,7 @@ bool Newton<Model>::restore(Iterate& at) {
   return gaps_closed(at.active, kDescentFeasibility);
 }
 
-// Those of a set that touch: an open gap pushes nothing.
+// The contacts of a set whose gap is closed: an open gap carries no multiplier.
 template <class Model>
 ActiveSet Newton<Model>::closed_contacts(const ActiveSet& active) const {
   ActiveSet kept;
@@ -216,7 +219,7 @@ ActiveSet Newton<Model>::closed_contacts(const ActiveSet& active) const {
   return kept;
 }
 
-// Whether every gap is met and the active ones are closed.
+// Whether no gap is violated and the active ones are closed.
 template <class Model>
 bool Newton<Model>::gaps_closed(const ActiveSet& active, double tolerance) const {
   double farthest = problem.violation();
@@ -233,7 +236,7 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
   ActiveSet target = at.active;
   if (!qp_.solve(problem, kkt_, target, step_)) return result;
-  // Energy may rise by what it costs to close gaps that are open by as little as is not told from closed.
+  // Closing gaps that are open within the tolerance may cost energy: λ times the gap.
   const double before = problem.energy();
   double allowed = before + kEnergyRoundoff * before;
   for (int j = 0; j < target.count; ++j)
@@ -241,14 +244,15 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   const double whole = std::min(1.0, largest / step_size(step_));
   trial_.command = at.command;
   const ActiveSet touching = closed_contacts(target);
-  // Where the curvature is negative the energy sinks farther along a damped step than that goes.
+  // Where H is not positive definite, the energy keeps falling beyond the end of a damped step.
   const bool stretched = damping_ > 0 && touching.count == target.count;
   const double farthest = stretched ? std::min(stretch_, largest / step_size(step_)) : whole;
   double scale = farthest;
-  // Restorations are measured by closeness: near a fold the energy hardly resists the motion that ends the branch.
-  if (!kkt_.factor(damping_ + kMeasureDamping * kkt_.max_curvature())) return result;
+  // The norm of restorations: near a fold the energy hardly resists the motion that ends the branch, so damping is
+  // added.
+  if (!kkt_.factor(damping_ + kNormDamping * kkt_.max_curvature())) return result;
   for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= scale > 2 * whole ? kStretch : 2) {
-    trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap that is to push
+    trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap with a multiplier
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
     if (problem.energy() > allowed) continue;
@@ -256,7 +260,7 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
     std::swap(at.mounts, trial_.mounts);
     at.active = closed_contacts(target);
     result.moved = true;
-    // Far from where it leads a heavily damped step is too short, near there a penalty that closes gaps costs nothing.
+    // Heavily damped steps are too short far from the end of a descent; near it a stronger penalty instead is harmless.
     creeping_ = !creeping_ && scale * step_size(step_) < kCreep;
     if (stretched) stretch_ = scale == farthest ? kStretch * scale : std::max(kStretch, scale);
     return result;

@@ -10,9 +10,9 @@
 namespace ccr {
 
 struct NewtonResult {
-  bool converged = false;  // to a stable equilibrium: the curvature is positive along the active gaps
+  bool converged = false;  // to a stable equilibrium: H is positive definite on the tangent space of the active gaps
   int iterations = 0;
-  bool moved = false;  // of a descent: whether it went on to another shape
+  bool moved = false;  // descent: whether another shape was reached
 };
 
 template <class Model>
@@ -23,21 +23,20 @@ class Newton {
   Newton(const Robot& robot, int obstacles);
   void set_obstacles(std::span<const Obstacle<Model::kSpace>> obstacles);
 
-  // Iteration with an l1 merit search: quadratic, for a start close to a stable equilibrium. Gives up where the
-  // curvature along the active gaps is not positive, after so many damped iterations.
+  // Newton iteration with an l1 merit line search, for a start close to a stable equilibrium. Gives up where H is not
+  // positive definite on the tangent space of the active gaps, but for the first `damped` iterations, which are damped.
   NewtonResult solve(Iterate& at, int damped);
 
-  // One iterate of energy descent from a feasible shape. Returns the result on that shape, and where it is not yet an
-  // equilibrium moves `at` to a feasible one of no more energy, by a step of at most the size `largest`; `moved` tells
-  // whether it could.
+  // One iterate of a feasible descent. Where `at` is an equilibrium, returns `converged`; otherwise moves `at` to a
+  // feasible shape of no more energy, by a step of at most the size `largest`, and returns whether it `moved`.
   NewtonResult descend_once(Iterate& at, double largest);
 
-  // Takes the curvature at `at` as the measure of motion for restore; false when it cannot be made positive.
+  // Sets the norm of `restore` to the convexified Hessian at a shape; false where it cannot be convexified.
   bool set_metric(const Iterate& at);
-  // Smallest motion that closes the active gaps exactly and meets every other; false when there is none nearby.
+  // Moves a shape as little as closes its active gaps and satisfies all others; false where that fails nearby.
   bool restore(Iterate& at);
 
-  // Factorisations of the Hessian so far, which nearly all of the work goes with.
+  // Factorisations of the KKT system so far, to which the work is nearly proportional.
   std::int64_t factorizations() const { return kkt_.factorizations; }
 
   ContactProblem<Model> problem;  // evaluated at the last iterate
@@ -59,9 +58,9 @@ class Newton {
   double step_size_ = 0;  // of `step_`
   Iterate trial_;
   double damping_ = 0;
-  double needed_ = 0;      // of damping, in the descent that goes on
-  double stretch_ = 1;     // of its next damped iterate
-  bool creeping_ = false;  // whether its iterates hardly move
+  double needed_damping_ = 0;  // damping that was needed last in this descent
+  double stretch_ = 1;         // of the next damped iterate of this descent
+  bool creeping_ = false;      // whether the iterates of this descent hardly move
 };
 
 }  // namespace ccr

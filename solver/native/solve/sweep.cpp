@@ -30,7 +30,7 @@ bool quadratic(const Obstacle<D>& obstacle) {
          obstacle.shape == Shape::kSpatialCapsule;
 }
 
-// How far a point is from a closed outline, as of straight pieces.
+// Distance of a point from a closed polygon.
 template <int D>
 double nearest(const std::vector<Position<D>>& outline, const Position<D>& point) {
   const int count = static_cast<int>(outline.size());
@@ -45,8 +45,8 @@ double nearest(const std::vector<Position<D>>& outline, const Position<D>& point
   return std::sqrt(square);
 }
 
-// The largest depth along an edge, or a bound of it that is no more than `enough`: no point of an edge is deeper than
-// the mean of what its ends are, and of its length.
+// Returns the largest depth along an edge by bisection, or an upper bound that is at most `enough`. The depth is
+// 1-Lipschitz, so it is bounded by half the sum of the depths of the ends and the length.
 template <int D>
 double deepest(const Obstacle<D>& obstacle, const Edge<D>& edge, double at_start, double at_end, double enough,
                int halvings) {
@@ -64,7 +64,7 @@ template <int D>
 double depth(const Obstacle<D>& obstacle, const Position<D>& point) {
   double gap;
   measure_gaps(obstacle, std::span<const Position<D>>(&point, 1), Position<D>{}, &gap);
-  if (!obstacle.outline.empty())  // of a shape whose gap is no distance
+  if (!obstacle.outline.empty())  // a shape whose gap is not a distance
     return gap > 0 ? 0.0 : nearest(obstacle.outline, point);
   if (!quadratic(obstacle)) return -gap;
   const double radius = obstacle.min_curvature_radius;
@@ -79,7 +79,7 @@ double distance_outside(const Obstacle<D>& obstacle, double gap) {
   return std::sqrt(std::max(0.0, radius * (radius + 2 * gap))) - radius;
 }
 
-// Conservative advancement: as far at a time as the depth leaves, and a little.
+// Conservative advancement: strides by the depth that is left, but at least a quarter of the tolerance.
 template <int D>
 bool path_clear(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to) {
   const double length = distance(from, to), allowed = kSweepDepth * obstacle.inradius;
@@ -111,14 +111,14 @@ bool edge_clear(const Obstacle<D>& obstacle, const Edge<D>& from, const Edge<D>&
   return false;
 }
 
-// A way between points outside is nowhere deeper than half its length, and less so where the surface is round.
+// A path between points outside is nowhere deeper than half its length, and less deep where the surface is round.
 template <int D>
 double harmless_path(const Obstacle<D>& obstacle) {
   return std::max(kSweepStride * obstacle.min_curvature_radius, 2 * kSweepDepth * obstacle.inradius);
 }
 
-// A point of the core lies nearer than R - h/2 to the middle of a ball of the radius of curvature R inside the
-// obstacle. Edges with their ends outside that ball stay sqrt(R² - h²/4) away from its middle, and on ways of length m
+// A point of the core is closer than R - h/2 to the centre of a ball inside the obstacle, of the radius of curvature R.
+// Edges with their ends outside that ball stay sqrt(R² - h²/4) away from its centre, and on paths of length m
 // sqrt(R² - h²/4 - m²/4).
 template <int D>
 double harmless_motion(const Obstacle<D>& obstacle, double longest) {

@@ -1,24 +1,23 @@
-// Whether a robot passed through an obstacle on the straight ways from one accepted shape to the next.
+// Whether a robot passed through an obstacle, on straight paths of its points between two accepted shapes.
 //
-// Contact is at points, so an edge between two of them may rest on an outline and lie in the obstacle by up to half its
-// length h: a point of it is no farther than that from the nearer end, which is outside. What no robot can do is have
-// an edge in the core of the obstacle, the points deeper in it than h/2.
+// Gaps constrain points, so an edge of length h between two of them may cut into an obstacle by up to h/2. No feasible
+// robot has an edge in the core of the obstacle, the points deeper than h/2: a passage is a path through the core.
 #pragma once
 
 #include "model/obstacle.hpp"
 
 namespace ccr {
 
-// How deep a point is in an obstacle, as exactly as its outline is given; at most 0 outside, and then no nearer than
-// that [mm].
+// Returns the depth of a point in an obstacle, as exact as its outline is. At most 0 outside, where its size is a lower
+// bound on the distance [mm].
 template <int D>
 double depth(const Obstacle<D>& obstacle, const Position<D>& point);
 
-// How far from the obstacle a point of some gap is, or less [mm].
+// Returns a lower bound on the distance of a point from the obstacle, given its gap [mm].
 template <int D>
 double distance_outside(const Obstacle<D>& obstacle, double gap);
 
-// Whether the straight way between two points outside cuts into the obstacle by no more than a little.
+// Whether the straight path between two points outside is nowhere deeper than the tolerance.
 template <int D>
 bool path_clear(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to);
 
@@ -28,11 +27,11 @@ struct Edge {
   Position<D> start, end;
 };
 
-// Whether the edge stays out of the points deeper than `half` on the straight ways of its ends.
+// Whether an edge, its ends on straight paths, stays out of the points deeper than `half`.
 template <int D>
 bool edge_clear(const Obstacle<D>& obstacle, const Edge<D>& from, const Edge<D>& to, double half);
 
-// The longest ways of all points for which path_clear and edge_clear, with edges of at most this length, need no look.
+// Return the longest paths for which path_clear, and edge_clear with edges up to `longest`, hold without a check.
 template <int D>
 double harmless_path(const Obstacle<D>& obstacle);
 template <int D>

@@ -143,7 +143,7 @@ bool ModelContinuation<Model>::is_blocked(const Command& command) {
   for (std::size_t m = 0; m < present_.mounts.size(); ++m)
     balance =
         std::max(balance, robot.max_length / robot.segments * norm(problem_.mount_load(holding, static_cast<int>(m))));
-  return balance <= kBarred * pressed;
+  return balance <= kBalance * pressed;
 }
 
 #define CCR_INSTANTIATE(Model)                                                  \
