@@ -1,4 +1,4 @@
-// Replays recorded steps of the kernel, for tools that count instructions: replay FILE, as instructions.py writes it.
+// Replays recorded steps of the kernel for tools that count instructions: replay FILE, written by instructions.py.
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -28,7 +28,7 @@ class Recording {
   std::FILE* file_;
 };
 
-// Steps of one robot in some scenes; returns how many there were.
+// Replays the steps of one robot in some scenes; returns their number.
 template <int D>
 int replay(Recording& recording) {
   ccr::testing::RobotNumbers numbers;

@@ -25,7 +25,7 @@ def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    in_space = [spatial.closure_function(), spatial.bend_function(), spatial.bow_function()]
+    in_space = [spatial.closure_function(), spatial.bend_function(), spatial.hessian_contraction_function()]
     generate("segment_laws", [segment_function(), arc_function(), *in_space], folder)
     generate("disk_laws", [disk_gap_function()], folder)
     kinds = (*GAP_LAWS, *spatial.GAP_LAWS)

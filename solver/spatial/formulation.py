@@ -150,7 +150,7 @@ def bend_function() -> ca.Function:
     return ca.Function("ccr_bend", segment.told, [ca.cse(ca.densify(ca.vertcat(*outputs)))])
 
 
-def bow_function() -> ca.Function:
+def hessian_contraction_function() -> ca.Function:
     """``(control, bending, pulls, l0, holes, force, moment) → Hessian in the control, row by row``, ``(9,)``.
 
     Of the objective and the work of a force on the chord and a moment on the turn of the upper disk, in the frame of
@@ -175,7 +175,7 @@ def bow_function() -> ca.Function:
     hessian += (turned + turned.T) / 2 + steep.T @ ca.diag(bends) @ steep
     along = ca.vertcat(ca.SX.eye(3), -inverse @ ca.jacobian(segment.closure, control))
     law = ca.vec(along.T @ hessian @ along)
-    return ca.Function("ccr_bow", [*segment.told, force, moment], [ca.cse(ca.densify(law))])
+    return ca.Function("ccr_hessian_contraction", [*segment.told, force, moment], [ca.cse(ca.densify(law))])
 
 
 def _inverse(matrix: ca.SX) -> ca.SX:

@@ -1,4 +1,4 @@
-// Dense linear algebra by the book, to compare with.
+// Textbook dense linear algebra as a reference.
 #pragma once
 
 #include <cmath>
@@ -19,7 +19,7 @@ class Dense {
   double& operator()(int r, int c) { return values_[static_cast<std::size_t>(r * columns_ + c)]; }
   double operator()(int r, int c) const { return values_[static_cast<std::size_t>(r * columns_ + c)]; }
 
-  // Adds a small block whose first entry stands here.
+  // Adds a small block at this row and column.
   template <int R, int C>
   void add(int row, int column, const Mat<R, C>& block) {
     for (int r = 0; r < R; ++r)
@@ -71,8 +71,8 @@ inline double apart(const Column& a, const Column& b) {
   return farthest;
 }
 
-// Cholesky factor in place of a symmetric matrix, below the diagonal. Returns the smallest pivot over the diagonal
-// entry it came from: positive exactly where the matrix is positive definite.
+// Replaces a symmetric matrix by its Cholesky factor, below the diagonal. Returns the smallest ratio of a pivot to its
+// diagonal entry, which is positive if and only if the matrix is positive definite.
 inline double cholesky(Dense& a) {
   double least = 1;
   for (int j = 0; j < a.rows(); ++j) {

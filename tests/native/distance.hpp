@@ -1,5 +1,4 @@
-// Signed distances of points from obstacles, negative inside, from their geometry alone: nothing of the gap laws is
-// used.
+// Signed distances of points from obstacles, negative inside, from geometry alone, independent of the gap laws.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +18,7 @@ double from_line(const Position<D>& point, const Position<D>& start, const Posit
   return norm(minus(point, nearest));
 }
 
-// From something that reaches this far in some directions at right angles, of which the point is so far beyond.
+// Distance from a product of convex sets in orthogonal directions, given the excess over each.
 template <int N>
 double beyond(const std::array<double, N>& excess) {
   double square = 0, deepest = -kInfinity;

@@ -1,6 +1,6 @@
-// Random robots, scenes and commands, every step looked at: fuzz SEED [SECONDS]. Episode k has the seed SEED + k and
-// depends on nothing else; the last one is cut short when the time is up. Without a time it is the one episode of the
-// seed, which shows again what failed.
+// Random robots, scenes and commands, every step checked: fuzz SEED [SECONDS]. Episode k depends on the seed SEED + k
+// alone; the last one is cut short when the time is up. Without a time, runs the one episode of the seed, to reproduce
+// a failure.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -9,43 +9,43 @@
 
 #include "scenes.hpp"
 
-// Of the sanitizers, where there are any: what to do before one ends the process.
+// Defined in builds with a sanitizer: sets what is called before it ends the process.
 extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));
 
 namespace ccr::testing {
 namespace {
 
 constexpr int kSteps = 100;           // of an episode
-constexpr double kLeastGap = -1e-12;  // over the length of the robot, as is the largest of an active one
-constexpr double kLimitBand = 1e-9;   // by which a tension may be above its limit, as a fraction
+constexpr double kLeastGap = -1e-12;  // over the robot's length; an active gap is at most as large
+constexpr double kLimitBand = 1e-9;   // excess of a tension over its limit, as a fraction of it
 constexpr int kStatuses = 5;
 
 constexpr double kOptimal = 1e-8;  // stationarity and complementarity, without units
 
 using Clock = std::chrono::steady_clock;
 
-std::uint64_t present = 0;  // seed of the episode under way
+std::uint64_t present = 0;  // seed of the current episode
 
-void tell() {
+void report_seed() {
   std::fprintf(stderr, "fuzz: failed in the episode of seed %llu\n", static_cast<unsigned long long>(present));
 }
 
 struct Tally {
   long episodes = 0, steps = 0, touching = 0, iterations = 0;
   long statuses[kStatuses] = {};
-  std::uint64_t seen[kStatuses] = {};  // seed of the episode that met a status last
-  int hardest = 0;                     // factorisations of a step
+  std::uint64_t seen[kStatuses] = {};  // seed of the last episode with each status
+  int hardest = 0;                     // largest number of factorisations in a step
 };
 
 template <int D>
 const char* fault(const Robot& robot, const BlockLayout& layout, int status, const std::vector<double>& block) {
-  if (status < 0 || status >= kStatuses) return "a status that there is not";
+  if (status < 0 || status >= kStatuses) return "an unknown status";
   for (const double number : block)
     if (!std::isfinite(number)) return "a number that is not finite";
   if (layout.gaps.size > 0 && block[layout.clearance.offset] < kLeastGap * robot.max_length)
     return "a point in an obstacle";
   for (std::size_t c = 0; c < layout.gaps.size; ++c) {
-    if (block[layout.multipliers.offset + c] < 0) return "a contact that pulls";
+    if (block[layout.multipliers.offset + c] < 0) return "a negative multiplier";
     if (block[layout.gaps.offset + c] < block[layout.clearance.offset]) return "a gap below the smallest one";
   }
   for (int k = 0; k < D - 1; ++k) {
@@ -58,7 +58,7 @@ const char* fault(const Robot& robot, const BlockLayout& layout, int status, con
 const char* fault(const ccr::Optimality& found) {
   if (!(found.gap <= -kLeastGap)) return "an active gap that is open";
   if (!(found.stationarity <= kOptimal)) return "forces that are not in equilibrium";
-  if (!(found.complementarity <= kOptimal)) return "a contact that pushes from afar";
+  if (!(found.complementarity <= kOptimal)) return "a multiplier on an open gap";
   return nullptr;
 }
 
@@ -118,7 +118,7 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "usage: fuzz SEED [SECONDS]\n");
     return 2;
   }
-  if (__sanitizer_set_death_callback) __sanitizer_set_death_callback(tell);
+  if (__sanitizer_set_death_callback) __sanitizer_set_death_callback(report_seed);
   const std::uint64_t seed = std::strtoull(arguments[1], nullptr, 10);
   const bool once = count == 2;
   const auto time =
@@ -127,7 +127,7 @@ int main(int count, char** arguments) {
   Tally tally;
   do {
     if (!run_episode(seed + static_cast<std::uint64_t>(tally.episodes), end, tally)) {
-      tell();
+      report_seed();
       return 1;
     }
   } while (!once && Clock::now() < end);

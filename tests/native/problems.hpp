@@ -1,4 +1,4 @@
-// A problem at a random shape, with contacts that lie where a test wants them.
+// A contact problem at a random shape, with contacts where a test wants them.
 #pragma once
 
 #include <doctest/doctest.h>
@@ -21,7 +21,7 @@ RobotNumbers numbers_of(int segments) {
   return of;
 }
 
-// Cables pulled by a twentieth of their segments, and controls close to those of the free robot.
+// Cables pulled by 0.4 mm per segment, and controls near those of the free robot.
 template <class Model>
 Iterate<Model> random_shape(Random& random, const RobotNumbers& of, int mounts, double size) {
   Iterate<Model> at;
@@ -37,7 +37,7 @@ Iterate<Model> random_shape(Random& random, const RobotNumbers& of, int mounts, 
   return at;
 }
 
-// The nodes of a problem, measured as the broad phase takes them.
+// Updates the broad phase with the nodes of the problem's last shape.
 template <class Model>
 void update_broadphase(ContactProblem<Model>& problem, const Iterate<Model>& at) {
   std::vector<Position<Model::kSpace>> nodes(problem.states().size());
@@ -46,7 +46,7 @@ void update_broadphase(ContactProblem<Model>& problem, const Iterate<Model>& at)
   problem.update_broadphase(nodes, at.mounts);
 }
 
-// All unknowns one after the other: controls, then mounts.
+// All unknowns in one column: controls, then mounts.
 template <class Model>
 Column flat(const std::vector<typename Model::Control>& controls, const std::vector<Position<Model::kSpace>>& mounts) {
   Column out;
@@ -69,7 +69,7 @@ std::size_t unknowns(const Iterate<Model>& at) {
   return at.controls.size() * Model::kControl + at.mounts.size() * Model::kSpace;
 }
 
-// Slope of the Lagrangian at a shape, in all unknowns.
+// Gradient of the Lagrangian at a shape, in all unknowns.
 template <class Model>
 Column lagrangian_slope(ContactProblem<Model>& problem, const Iterate<Model>& at) {
   REQUIRE(problem.evaluate(at));

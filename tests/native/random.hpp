@@ -1,4 +1,4 @@
-// Random numbers that are the same everywhere, which those of the standard distributions are not.
+// Random numbers that are the same on every platform, unlike those of the standard distributions.
 #pragma once
 
 #include <cmath>
@@ -29,7 +29,7 @@ class Random {
     return out;
   }
 
-  // Symmetric, with this added on the diagonal.
+  // A symmetric matrix with `shift` added to its diagonal.
   template <int N>
   Mat<N, N> symmetric(double shift) {
     Mat<N, N> out;

@@ -1,5 +1,5 @@
-// Robots and obstacles as the tests, the fuzz and the benchmarks' replay make them: the only place that fills in their
-// fields, as solver/robot.py and solver/obstacles.py do for Python.
+// Robots and obstacles for the tests, the fuzz and the benchmarks' replay. Their fields are filled in here only, as
+// kernel_robot and solver/common/kernel_input.py do for Python.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace ccr::testing {
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kQuarterTurn = 1.5707963267948966;
 
-// The numbers that describe a robot; those of the paper's prototype unless told.
+// The numbers that describe a robot, by default the paper's prototype.
 struct RobotNumbers {
   bool rod = false;
   int segments = 18;
@@ -28,10 +28,10 @@ struct RobotNumbers {
   int between = 0;
 };
 
-// A robot that is touched on these lines, each a place on its disks.
+// A robot with these lines of points that can touch, each a position on the disks.
 inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
   const double segment = of.length / of.segments;
-  std::vector<double> edges;  // stretched by as much as the disks of a segment can turn, about
+  std::vector<double> edges;  // longer by about as much as the disks of a segment can turn
   for (const Vec<2>& line : lines)
     edges.push_back((segment + norm(line) * (of.rod ? segment / of.offset : 0.4)) / (of.between + 1));
   return {.model = of.rod ? ModelKind::kRod : ModelKind::kPaper,
@@ -48,7 +48,7 @@ inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
           .between = of.between};
 }
 
-// Touched on backbone and cable in the plane; in space on the backbone, the holes of both cables, and opposite them.
+// Lines on backbone and cable in the plane; in space on the backbone, through both holes, and opposite them.
 template <int D>
 Robot make_robot(const RobotNumbers& of) {
   const double a = of.offset, x = a * std::cos(of.angle), y = a * std::sin(of.angle);
@@ -72,7 +72,7 @@ Position<D> middle(const Position<D>& a, const Position<D>& b) {
   return out;
 }
 
-// A ball that holds a shape, and the smallest radius of its surface.
+// A ball that contains a shape, and the smallest radius of curvature of its surface.
 template <int D>
 struct Extent {
   Position<D> center;
@@ -125,7 +125,7 @@ inline Extent<3> extent_of(Shape shape, const double* p, Position<3>) {
   }
 }
 
-// Points of an ellipse, whose gap is no distance.
+// Points of an ellipse, whose gap is not a distance.
 inline std::vector<Position<2>> ellipse_outline(const double* p) {
   std::vector<Position<2>> outline;
   for (int k = 0; k < 96; ++k) {
@@ -135,7 +135,7 @@ inline std::vector<Position<2>> ellipse_outline(const double* p) {
   return outline;
 }
 
-// An obstacle that all points of a robot can touch, from its shape as the gap laws take it. On a spring where
+// An obstacle that all points of a robot can touch, from the parameters of its gap law. Mounted where the stiffness
 // `spring` is positive [N/mm].
 template <int D>
 Obstacle<D> make_obstacle(const Robot& robot, Shape shape, std::span<const double> parameters, double spring = 0) {
@@ -156,7 +156,7 @@ Obstacle<D> make_obstacle(const Robot& robot, Shape shape, std::span<const doubl
   return obstacle;
 }
 
-// The same, for one point of the robot alone.
+// The same obstacle for one point of the robot only.
 template <int D>
 Obstacle<D> for_point(Obstacle<D> obstacle, int point) {
   std::fill(obstacle.touchable.begin(), obstacle.touchable.end(), static_cast<unsigned char>(0));
@@ -173,7 +173,7 @@ inline Obstacle<3> sphere(const Robot& robot, double x, double y, double z, doub
   return make_obstacle<3>(robot, Shape::kSphere, std::array{x, y, z, r}, spring);
 }
 
-// Half of the plane or of space: outward unit normal and offset.
+// A half-plane or half-space with an outward unit normal and an offset.
 template <int D>
 Obstacle<D> wall(const Robot& robot, const Position<D>& normal, double offset, double spring = 0) {
   std::array<double, D + 1> parameters;

@@ -13,11 +13,11 @@
 
 namespace ccr::testing {
 
-// How many shapes there are: in the plane, compiled ones among them.
+// Number of shapes, in the plane with a compiled one.
 template <int D>
 inline constexpr int kShapes = D == 2 ? 6 : 5;
 
-// A compiled gap law: that of a disc, whose centre and radius are the parameters.
+// A compiled gap law: a disc, its centre and radius the parameters.
 inline int disc_law(const double** in, double** out, int*, double*, int) {
   const double x = in[0][0] - in[1][0], y = in[0][1] - in[1][1], r = in[1][2];
   const double gap[] = {(x * x + y * y - r * r) / (2 * r), x / r, y / r, 1 / r, 0, 1 / r};
@@ -33,7 +33,7 @@ inline Obstacle<2> make_custom(const Robot& robot, const Position<2>& center, do
   return obstacle;
 }
 
-// Obstacles of one of the shapes, about as large as a ball of radius r at a place; walls face the straight robot.
+// A random obstacle of a shape, about as large as a ball of radius r at a point; walls face the straight robot.
 inline Obstacle<2> random_obstacle(Random& random, const Robot& robot, int shape, const Position<2>& at, double r,
                                    double spring) {
   const auto made = [&](Shape kind, std::initializer_list<double> numbers) {
@@ -53,7 +53,7 @@ inline Obstacle<2> random_obstacle(Random& random, const Robot& robot, int shape
       const int corners = random.integer(3, 8);
       const double edge = r * random.decades(-2, -0.3), turned = random.uniform(0, 7);
       std::vector<double> numbers = {edge};
-      for (int k = 0; k < 8; ++k) {  // the last one repeated
+      for (int k = 0; k < 8; ++k) {  // the last corner is repeated
         const double angle = turned + 2 * std::numbers::pi * std::min(k, corners - 1) / corners;
         numbers.insert(numbers.end(), {at[0] + 2 * r * std::cos(angle), at[1] + 2 * r * std::sin(angle)});
       }
@@ -93,7 +93,7 @@ inline Obstacle<3> random_obstacle(Random& random, const Robot& robot, int shape
   }
 }
 
-// A robot of any size, from a thousandth of the prototype to a thousand of it, the same in its own units.
+// A random robot, by default from a thousandth to a thousand times the size of the prototype.
 template <int D>
 RobotNumbers random_robot(Random& random, double decades = 3) {
   const double scale = random.decades(-decades, decades);
@@ -125,7 +125,7 @@ std::vector<double> rest_block(Continuation<D>& continuation, double length) {
   return block;
 }
 
-// Some obstacles beside the straight robot, clear of it, wide enough not to slip between its points.
+// Random obstacles clear of the straight robot and too large to slip between its points.
 template <int D>
 Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, double springs = 0.2) {
   Setting<D> out{make_robot<D>(of), {}, {}};
@@ -153,7 +153,7 @@ Setting<D> random_setting(Random& random, const RobotNumbers& of, int count, dou
   return out;
 }
 
-// Commands that drift, jump and turn back.
+// Random commands that drift, jump and reverse.
 template <int D>
 class Commands {
  public:

@@ -1,6 +1,6 @@
-// Active-set problems built backwards from their answer: the shape is free, the gaps are walls that one point each can
-// touch, so that a wall's normal gives its gradient and its offset any gap that is wanted. The cable of a rod is one
-// more gap, its slack, which the displacement sets.
+// Quadratic programs built backwards from their solution: each gap is that of one point from a wall, whose normal sets
+// the gradient and whose offset the value. For the rod, the slack of the cable is one more gap, set by the
+// displacement.
 #include <algorithm>
 
 #include "problems.hpp"
@@ -9,10 +9,9 @@
 namespace ccr::testing {
 namespace {
 
-constexpr double kLargest = 2e-5;  // multiplier of a wall, which leaves the curvature positive [rad²/mm]
-constexpr double kTaut = 0.0125;   // of a cable that holds the shape, about
-constexpr double kAway =
-    0.002;  // coordinates from where nothing moves, so that the step stays within reach of the walls
+constexpr double kLargest = 2e-5;  // multiplier of a wall that leaves H positive definite [rad²/mm]
+constexpr double kTaut = 0.0125;   // approximate multiplier of the slack
+constexpr double kAway = 0.002;    // size of the controls, small for a step within reach of the walls
 
 template <class Model>
 struct Wanted {
@@ -45,8 +44,8 @@ struct Wanted {
   int contact(int gap) const { return gap == walls() ? problem.contacts() : gap * robot.points() + points[gap]; }
   Slope slope(int gap) const { return problem.slope(contact(gap)); }
 
-  // Puts the walls where the gaps are as wanted.
-  void place() {
+  // Puts the walls where the gaps have their wanted values.
+  void build_walls() {
     REQUIRE(problem.evaluate(at));
     if constexpr (Model::kRod) at.command.cables[0] = problem.states().back()[3] - gaps.back();
     obstacles.clear();
@@ -68,20 +67,20 @@ struct Wanted {
     return out;
   }
 
-  // The step from the present multipliers to these, and gaps that make it the answer: closed under it where something
-  // pushes, open by `slack` where it does not.
+  // Chooses the multipliers of the solution, which give its step, and gaps that make it optimal: closed under the step
+  // where λ > 0, open by `slack` elsewhere.
   void choose(const std::vector<double>& multipliers, double slack) {
     std::fill(gaps.begin(), gaps.end(), 0);
-    place();
+    build_walls();
     step = respond(nullptr);
     std::vector<double> change = multipliers;
     for (int j = 0; j < count(); ++j) change[j] -= this->multipliers(at.active)[j];
     add_responses(change, step);
     for (int j = 0; j < count(); ++j) gaps[j] = (multipliers[j] > 0 ? 0 : slack) - slope(j).along(step);
-    place();
+    build_walls();
   }
 
-  // Some of the walls push already.
+  // Starts with some walls active.
   void warm(Random& random) {
     for (int j = 0; j < walls(); ++j)
       if (random.chance(0.4)) {
@@ -90,7 +89,7 @@ struct Wanted {
       }
   }
 
-  // Adds what multipliers do to a step.
+  // Adds Σ λ H⁻¹∇c to a step.
   void add_responses(const std::vector<double>& multipliers, Direction& to) {
     for (int j = 0; j < count(); ++j) {
       const Slope slope = this->slope(j);
@@ -98,7 +97,7 @@ struct Wanted {
     }
   }
 
-  // Of each gap, from an active set.
+  // Multipliers of all gaps, from an active set.
   std::vector<double> multipliers(const ActiveSet& active) const {
     std::vector<double> out(gaps.size());
     for (int j = 0; j < active.count; ++j) {
@@ -125,7 +124,7 @@ struct Wanted {
   std::vector<Obstacle<kSpace>> obstacles;
 };
 
-// Of some of the walls, and of the cable of a rod.
+// Random multipliers of some walls, and of the rod's slack.
 template <class Model>
 std::vector<double> choose(Random& random, int walls, double pushing) {
   std::vector<double> out(static_cast<std::size_t>(walls));
@@ -156,8 +155,8 @@ void chosen_sets() {
   CHECK(pushed > 100);
 }
 
-// Where walls coincide, or more of them meet in a point than it can move in directions, their multipliers are many but
-// the step is one.
+// Where walls coincide, or more of them meet in a point than it has degrees of freedom, multipliers are not unique but
+// the step is.
 template <class Model>
 void dependent_gaps() {
   Random random(2);
@@ -177,7 +176,7 @@ void dependent_gaps() {
     CHECK(active.count <= Model::kSpace + Model::kRod);
     std::vector<double> found = wanted.multipliers(active);
     CHECK(*std::min_element(found.begin(), found.end()) >= 0);
-    Direction<Model> pushed(wanted.of.segments, 0);  // by all walls together, more than was wanted
+    Direction<Model> pushed(wanted.of.segments, 0);  // by the difference of the multipliers
     for (int j = 0; j < wanted.count(); ++j) found[j] -= multipliers[j];
     wanted.add_responses(found, pushed);
     CHECK(largest(flat<Model>(pushed.controls, pushed.mounts)) <= 1e-6 * wanted.size());
@@ -191,14 +190,14 @@ void no_answer() {
   wanted.points = {5, 5};
   for (int k = 0; k < Model::kSpace; ++k) wanted.normals[1][k] = -wanted.normals[0][k];
   wanted.gaps[0] = wanted.gaps[1] = -0.1;  // a point on the wrong side of two walls that face each other
-  wanted.place();
+  wanted.build_walls();
   ActiveSetQp<Model> qp(wanted.of.segments, 0);
   ActiveSet active = wanted.at.active;
   Direction<Model> step(wanted.of.segments, 0);
   CHECK_FALSE(qp.solve(wanted.problem, wanted.kkt, active, step));
 }
 
-// The smallest step, measured by the Hessian, that closes the gaps which are held.
+// The smallest step in the norm of H that closes the held gaps.
 template <class Model>
 void restorations() {
   Random random(4);
@@ -206,14 +205,14 @@ void restorations() {
     Wanted<Model> wanted(random, 3);
     for (double& gap : wanted.gaps) gap = random.uniform(-0.1, 0.1);
     wanted.gaps[2] = 2;  // not held, and open
-    wanted.place();
+    wanted.build_walls();
     ActiveSet active = wanted.at.active;
     for (int j = 0; j < 2; ++j) active.contact[active.count++] = wanted.contact(j);
     const int held = active.count;
     ActiveSetQp<Model> qp(wanted.of.segments, 0);
     Direction<Model> step(wanted.of.segments, 0);
     REQUIRE(qp.restore(wanted.problem, wanted.kkt, active, step));
-    // A combination of the responses to the held gaps: as many equations for its parts.
+    // It is a combination of the responses to the held gaps, found by as many equations.
     Dense gram(held, held);
     Column shortfall(static_cast<std::size_t>(held));
     std::vector<typename Wanted<Model>::Slope> slopes;
@@ -239,10 +238,8 @@ void restorations() {
 TEST_CASE_TEMPLATE("the active set and multipliers are those that were chosen", Model, CCR_MODELS) {
   chosen_sets<Model>();
 }
-TEST_CASE_TEMPLATE("gaps that depend on each other leave the step alone", Model, CCR_MODELS) {
-  dependent_gaps<Model>();
-}
-TEST_CASE_TEMPLATE("a problem without an answer is given up", Model, CCR_MODELS) { no_answer<Model>(); }
+TEST_CASE_TEMPLATE("linearly dependent gaps leave the step unchanged", Model, CCR_MODELS) { dependent_gaps<Model>(); }
+TEST_CASE_TEMPLATE("an infeasible program is given up", Model, CCR_MODELS) { no_answer<Model>(); }
 TEST_CASE_TEMPLATE("a restoration is the smallest step that closes the gaps", Model, CCR_MODELS) {
   restorations<Model>();
 }

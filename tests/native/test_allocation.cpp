@@ -1,4 +1,4 @@
-// No step allocates: the global operators count.
+// No step allocates memory: the global operators count allocations.
 #include <doctest/doctest.h>
 
 #include <atomic>
@@ -26,7 +26,7 @@ void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); 
 namespace ccr::testing {
 namespace {
 
-// A robot that is pulled along a path, in steps that are looked at one by one.
+// A robot pulled along a path, its steps counted.
 template <int D>
 class Pulled {
  public:
@@ -39,7 +39,7 @@ class Pulled {
     rest_ = now_;
   }
 
-  // Goes to a displacement in equal steps, along a direction in space, and counts.
+  // Pulls to a displacement in equal steps, in space along a direction, and counts.
   void pull(double to, int steps, double second = 0.4) {
     const double from = now_[0];
     for (int k = 1; k <= steps; ++k) {
@@ -56,7 +56,7 @@ class Pulled {
     }
   }
 
-  // Forgets what was counted, from rest.
+  // Resets the counts and returns to rest.
   void begin() {
     now_ = rest_;
     allocated = touched = 0;
@@ -73,7 +73,7 @@ class Pulled {
   std::vector<double> rest_, now_, to_;
 };
 
-// There and back twice, the first time to warm up; returns what the second allocated.
+// Pulls there and back twice, the first time to warm up; returns the counts of the second.
 template <int D>
 Pulled<D> twice(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles, double to) {
   Pulled<D> pulled(of, obstacles);
@@ -164,8 +164,8 @@ TEST_CASE("a batch's steps allocate nothing") {
       continuation.follow(block, command, block);
     });
   };
-  // Which thread takes which robot is left to chance, so a thread may first meet one in a later round: the rounds go on
-  // until one allocates nothing.
+  // Which thread takes which robot is random, so a thread may warm up in a later round: repeat until a round allocates
+  // nothing.
   const auto round_allocates = [&] {
     const long before = allocations;
     for (double cable = 0; cable < 5; cable += 0.25) step(cable);

@@ -1,4 +1,4 @@
-// A batch of robots: the bits of each are those it has alone, for any number of threads, batch size and order.
+// Results of a batch are bit-identical to single robots, for any number of threads, batch size and order.
 #include <doctest/doctest.h>
 
 #include <cstring>
@@ -19,20 +19,20 @@ struct Work {
     }
   }
 
-  // Cables that pull more with each step, towards a place in space.
-  std::array<double, D> towards(Random& random, const Position<D>& place, int step) const {
+  // Commands that pull more with each step, in space towards a point.
+  std::array<double, D> towards(Random& random, const Position<D>& point, int step) const {
     const double pull = 1.1 * robot.offset * step / kSteps * random.uniform(0.9, 1.1);
     if constexpr (D == 2) return {pull, length};
-    const double away = std::hypot(place[0], place[1]);
+    const double away = std::hypot(point[0], point[1]);
     std::array<double, D> command{};
-    for (int k = 0; k < D - 1; ++k) command[k] = pull * place[k] / away;
+    for (int k = 0; k < D - 1; ++k) command[k] = pull * point[k] / away;
     command[D - 1] = length;
     return command;
   }
 
   static constexpr int kObstacles = 2, kSteps = 8;
 
-  // Blocks, statuses and iterations of all robots after all steps.
+  // Blocks, statuses and iterations after all steps.
   struct Reached {
     std::vector<double> blocks;
     std::vector<int> statuses, iterations;
@@ -70,7 +70,7 @@ struct Work {
     return out;
   }
 
-  // Some robots at a time, from the last one on or from the first.
+  // Steps some robots at a time, from the first or from the last.
   Reached together(int threads, int at_a_time, bool backwards) const {
     const int count = static_cast<int>(settings.size());
     Batch<D> batch(robot, count, kObstacles, threads);
@@ -114,12 +114,12 @@ void compare(bool rod) {
     }
 }
 
-TEST_CASE("a batch's bits are those of robots alone, in the plane") {
+TEST_CASE("a batch is bit-identical to single robots in the plane") {
   compare<2>(false);
   compare<2>(true);
 }
 
-TEST_CASE("a batch's bits are those of robots alone, in space") { compare<3>(false); }
+TEST_CASE("a batch is bit-identical to single robots in space") { compare<3>(false); }
 
 TEST_CASE("every robot of a call is worked on once") {
   Batch<2> batch(make_robot<2>({}), 100, 0, 4);
@@ -129,7 +129,7 @@ TEST_CASE("every robot of a call is worked on once") {
   for (const int count : visits) CHECK(count == 300);
 }
 
-TEST_CASE("pools come and go, asked for work or not") {
+TEST_CASE("pools can be destroyed, used or unused") {
   for (int round = 0; round < 50; ++round) {
     Pool idle(3), pool(3);
     std::atomic<int> sum = 0;

@@ -16,7 +16,7 @@ Position<D> beside(Random& random, const Position<D>& center, double distance) {
   return out;
 }
 
-// The point of the surface on the way from the middle of an obstacle outwards.
+// The point of the surface between a point inside and one outside.
 template <int D>
 Position<D> on_surface(const Obstacle<D>& obstacle, const Position<D>& inside, const Position<D>& outside) {
   double low = 0, high = 1;
@@ -29,7 +29,7 @@ Position<D> on_surface(const Obstacle<D>& obstacle, const Position<D>& inside, c
   return point;
 }
 
-// Calls with obstacles of every shape and scale, a place inside each, and its size.
+// Calls `check` with obstacles of every shape and scale, a point inside, and the size.
 template <int D, class Check>
 void each_obstacle(std::uint64_t seed, Check check) {
   Random random(seed);
@@ -40,7 +40,7 @@ void each_obstacle(std::uint64_t seed, Check check) {
         Position<D> at = random.matrix<D>(50 * scale);
         const double r = kSize * scale * random.uniform(0.5, 2);
         const Obstacle<D> obstacle = random_obstacle(random, robot, shape, at, r, 0);
-        if (obstacle.wall())  // the place of a wall is on its surface
+        if (obstacle.wall())  // the point of a wall is on its surface
           for (int k = 0; k < D; ++k) at[k] -= r * obstacle.parameters[k];
         CAPTURE(scale);
         CAPTURE(shape);
@@ -69,7 +69,7 @@ void derivatives() {
     for (int k = 0; k < 10; ++k) {
       const Position<D> point = beside<D>(random, at, r * random.uniform(1, 4));
       const Gap<D> gap = measure_gap(obstacle, point);
-      if (gap.value < 0) continue;  // on the far side of a core's edges no derivatives are asked for
+      if (gap.value < 0) continue;  // the derivatives are not used deep inside
       const double h = 1e-6 * r;
       const Mat<D, D> curvature = gap.curvature(1);
       for (int c = 0; c < D; ++c) {
@@ -97,7 +97,7 @@ void bounds() {
     for (std::size_t k = 0; k < points.size(); ++k)
       CHECK(gaps[k] == doctest::Approx(measure_gap(obstacle, minus(points[k], moved)).value).epsilon(1e-12).scale(r));
 
-    // No point of the surface is nearer than the broad phase says.
+    // No point of the surface is nearer than the lower bounds of the broad phase.
     double nearest = kInfinity;
     for (int k = 0; k < 200; ++k) {
       const Position<D> outside = beside<D>(random, at, 20 * r);
@@ -121,12 +121,12 @@ TEST_CASE("slopes and curvatures of the gaps are those of their values") {
   derivatives<3>();
 }
 
-TEST_CASE("moved gaps are those of the points moved back; the broad phase never says too much") {
+TEST_CASE("gaps of displaced obstacles equal those of points moved back; the broad phase is a lower bound") {
   bounds<2>();
   bounds<3>();
 }
 
-TEST_CASE("the gap of what has a distance is that distance") {
+TEST_CASE("the gap of a wall, and of a polygon, is the distance") {
   const Robot robot = make_robot<2>({});
   CHECK(measure_gap(wall<2>(robot, {{0.6, 0.8}}, 5), {{6, 8}}).value == doctest::Approx(5));
   CHECK(measure_gap(circle(robot, 1, 2, 3), {{1, 8}}).value == doctest::Approx((36.0 - 9) / 6));

@@ -1,4 +1,5 @@
-// A problem among obstacles, fixed and on springs: its slopes and its Hessian against differences, dense.
+// The gradient and Hessian of a contact problem with fixed and mounted obstacles, against differences and dense
+// algebra.
 #include "problems.hpp"
 
 namespace ccr::testing {
@@ -10,7 +11,7 @@ template <class Model>
 struct Touched {
   static constexpr int kSpace = Model::kSpace;
 
-  // A round obstacle on each of a few points, the first two of them on springs, the last beside the middle of an edge.
+  // A round obstacle at each of a few random points, the first two on springs.
   explicit Touched(Random& random)
       : of(numbers(random)),
         robot(make_robot<kSpace>(of)),
@@ -50,7 +51,7 @@ struct Touched {
       return sphere(robot, center[0], center[1], center[2], r, spring);
   }
 
-  // Energy and springs less what the contacts hold.
+  // J - Σ λ c.
   double lagrangian(const Iterate<Model>& there) {
     REQUIRE(problem.evaluate(there));
     double value = problem.energy();
@@ -58,7 +59,7 @@ struct Touched {
     return value;
   }
 
-  // Of a function of the shape by central differences, one column for each unknown.
+  // Central differences of a function of the shape, one column for each unknown.
   template <class Function>
   Dense differences(int rows, Function function) {
     const int n = static_cast<int>(unknowns(at));
@@ -165,13 +166,13 @@ void kkt_systems() {
   CHECK(definite >= 5);
 }
 
-TEST_CASE_TEMPLATE("the slope of the Lagrangian is that of its value", Model, Planar<PaperLaw>, Planar<RodLaw>,
-                   Spatial) {
+TEST_CASE_TEMPLATE("the gradient of the Lagrangian matches differences of its value", Model, Planar<PaperLaw>,
+                   Planar<RodLaw>, Spatial) {
   slopes<Model>();
 }
 
-TEST_CASE_TEMPLATE("the Hessian is that of the Lagrangian, springs and penalties included", Model, Planar<PaperLaw>,
-                   Planar<RodLaw>, Spatial) {
+TEST_CASE_TEMPLATE("the KKT system solves with the Hessian of the Lagrangian, springs and penalties included", Model,
+                   Planar<PaperLaw>, Planar<RodLaw>, Spatial) {
   kkt_systems<Model>();
 }
 

@@ -29,7 +29,7 @@ void sample(Random& random, Mat<N, N>& a) {
 void sample(Random& random, PlanarTransition& a) { a = {random.uniform(-1, 1), random.uniform(-1, 1)}; }
 void sample(Random& random, SpatialTransition& a) { a.chord = random.matrix<3>(); }
 
-// A random problem twice: as the recursion takes it, and in the controls alone.
+// A random problem in two forms: for the recursion, and dense in the controls alone.
 template <int NX, int NU, class Transition>
 struct Problem {
   using System = Riccati<NX, NU, Transition>;
@@ -114,7 +114,7 @@ struct RightHandSides {
         states(count, std::vector<Vec<NX>>(n + 1)),
         forces(count) {
     for (int k = 0; k < count; ++k) {
-      dense.push_back(product(transposed(problem.motion), push(random, n, forces[k])));
+      dense.push_back(product(transposed(problem.motion), add_forces(random, n, forces[k])));
       const bool sloped = random.chance(0.5);
       for (Vec<NU>& slope : slopes[k]) slope = random.matrix<NU>();
       if (sloped)
@@ -123,8 +123,8 @@ struct RightHandSides {
     }
   }
 
-  // Adds up to two forces; returns what they make on all states.
-  static Column push(Random& random, int n, std::vector<typename System::Force>& forces) {
+  // Adds up to two forces; returns their sum in all states.
+  static Column add_forces(Random& random, int n, std::vector<typename System::Force>& forces) {
     Column on_states(static_cast<std::size_t>(NX * (n + 1)));
     for (int left = random.integer(0, 2); left > 0; --left) {
       const int node = random.integer(0, n);
@@ -143,7 +143,7 @@ struct RightHandSides {
   std::vector<std::vector<Vec<NX>>> states;
   std::vector<std::vector<typename System::Force>> forces;
   std::vector<typename System::Load> loads;
-  std::vector<Column> dense;  // the same in all controls
+  std::vector<Column> dense;  // the same, reduced to the controls
 };
 
 template <int NX, int NU, class Transition>
@@ -195,7 +195,7 @@ TEST_CASE("the recursion is a dense Cholesky factorisation, 6 states and 3 contr
   compare<6, 3, SpatialTransition>(6);
 }
 
-TEST_CASE("L D Lᵀ of a small block says whether it is positive definite, and solves") {
+TEST_CASE("L D Lᵀ of a small matrix detects whether it is positive definite, and solves") {
   Random random(7);
   int definite = 0;
   for (int trial = 0; trial < 500; ++trial) {

@@ -1,4 +1,4 @@
-// The laws of a segment: the geometry they stand for, their derivatives, and that wide registers change no bit.
+// The segment laws: their geometry, their derivatives, and that AVX2 gives the same bits.
 #include <doctest/doctest.h>
 
 #include <cstring>
@@ -24,9 +24,9 @@ CCR_DECLARE(avx2)
 namespace testing {
 namespace {
 
-constexpr double kScales[] = {1e-3, 1, 1e3};  // of a robot whose segments are 10 mm long, with disks of 8 mm
+constexpr double kScales[] = {1e-3, 1, 1e3};  // of a robot with segments of 10 mm and cables 8 mm off the backbone
 constexpr double kDifference = 1e-5;          // of a coordinate, for central differences
-constexpr double kClose = 1e-8;               // what they leave, relative to slopes of about one
+constexpr double kClose = 1e-8;               // error of the differences, relative to derivatives of about one
 
 bool near(double a, double b, double scale) { return std::abs(a - b) <= kClose * scale; }
 
@@ -42,7 +42,7 @@ RodLaw::Bend rod(double angle, double scale) {
   return bends[0];
 }
 
-// Length of the cable between the holes of two disks, from where the upper node is and how far its disk is turned.
+// Length of the cable between the holes of two disks, from position and angle of the upper one.
 double cable_length(double forward, double sideways, double cosine, double sine, double scale) {
   const double x = -10 * sideways + 8 * cosine - 8, y = 10 * forward - 8 * sine;
   return scale * std::hypot(x, y);
@@ -86,7 +86,7 @@ TEST_CASE("the slopes of the paper's segment are those of its shape") {
 
 TEST_CASE("a segment that shears beyond its cable has no shape") { CHECK(std::isnan(paper(0.99, 0.9, 1).angle)); }
 
-TEST_CASE("a segment of the rod is an arc, and takes what the way between its holes is short of") {
+TEST_CASE("a segment of the rod is an arc, and takes the cable by which its holes come closer") {
   for (const double scale : kScales)
     for (const double angle : {-2.5, -0.4, 0.0, 1e-5, 0.1, 1.1}) {  // until the disks meet
       const auto bend = rod(angle, scale);
@@ -124,8 +124,8 @@ struct InSpace {
 };
 static_assert(sizeof(InSpace) == SpatialLaw::kBend * sizeof(double));
 
-SegmentInputs segment_inputs(const Vec<2>& pulls, double angle, double scale) {
-  return {{pulls[0] * scale, pulls[1] * scale},
+SegmentInputs segment_inputs(const Vec<2>& displacements, double angle, double scale) {
+  return {{displacements[0] * scale, displacements[1] * scale},
           10 * scale,
           {8 * scale, 0, 8 * scale * std::cos(angle), 8 * scale * std::sin(angle)}};
 }
@@ -165,7 +165,7 @@ Mat<3, 3> hessian_contraction(const Vec<3>& control, const SegmentInputs& inputs
   return out;
 }
 
-// Slope in the control of the objective and of the work of a force on the chord and a moment on the turn.
+// Gradient, in the control, of the objective and of the work of a force on the chord and a moment on the rotation.
 Vec<3> slope(const InSpace& bend, const Vec<3>& force, const Vec<3>& moment) {
   Vec<3> out = bend.objective_slope;
   out += transpose_times(bend.chord_slope, force);
@@ -173,7 +173,7 @@ Vec<3> slope(const InSpace& bend, const Vec<3>& force, const Vec<3>& moment) {
   return out;
 }
 
-// Turn from one rotation to one close to it, in the frame that both lead to.
+// Small rotation between two rotations that are close.
 Vec<3> turn(const Mat<3, 3>& from, const Mat<3, 3>& to) {
   Mat<3, 3> between;
   for (int r = 0; r < 3; ++r)
@@ -185,7 +185,7 @@ Vec<3> turn(const Mat<3, 3>& from, const Mat<3, 3>& to) {
 
 struct Case {
   Vec<3> control;
-  Vec<2> pulls;
+  Vec<2> displacements;
   double angle, scale;
 };
 
@@ -203,7 +203,7 @@ std::vector<Case> cases() {
 
 TEST_CASE("a segment in space is as long as its cables say") {
   for (const Case& c : cases()) {
-    const SegmentInputs inputs = segment_inputs(c.pulls, c.angle, c.scale);
+    const SegmentInputs inputs = segment_inputs(c.displacements, c.angle, c.scale);
     const InSpace bend = in_space(c.control, inputs);
     CHECK(norm(bend.chord) == doctest::Approx(inputs.length).epsilon(1e-14));
     for (int k = 0; k < 2; ++k) {
@@ -219,7 +219,7 @@ TEST_CASE("a segment in space is as long as its cables say") {
 TEST_CASE("the slopes of a segment in space are those of its shape") {
   const double h = kDifference;
   for (const Case& c : cases()) {
-    const SegmentInputs inputs = segment_inputs(c.pulls, c.angle, c.scale);
+    const SegmentInputs inputs = segment_inputs(c.displacements, c.angle, c.scale);
     const InSpace at = in_space(c.control, inputs);
     const auto compare = [&](const InSpace& more, const InSpace& less, double step, double objective,
                              const Vec<3>& chord, const Vec<3>& turned, double unit) {
@@ -239,7 +239,7 @@ TEST_CASE("the slopes of a segment in space are those of its shape") {
               column(at.turn_slope, k), 1);
     }
     for (int k = 0; k < 2; ++k) {
-      Vec<2> up = c.pulls, down = c.pulls;
+      Vec<2> up = c.displacements, down = c.displacements;
       up[k] += h;
       down[k] -= h;
       compare(in_space(c.control, segment_inputs(up, c.angle, c.scale)),
@@ -250,11 +250,11 @@ TEST_CASE("the slopes of a segment in space are those of its shape") {
   }
 }
 
-TEST_CASE("the curvature of a segment in space is that of its work") {
+TEST_CASE("the contracted Hessian of a segment in space matches differences of its gradient") {
   Random random(2);
   const double h = kDifference;
   for (const Case& c : cases()) {
-    const SegmentInputs inputs = segment_inputs(c.pulls, c.angle, c.scale);
+    const SegmentInputs inputs = segment_inputs(c.displacements, c.angle, c.scale);
     const Vec<3> force = random.matrix<3>(1 / c.scale), moment = random.matrix<3>();
     const Mat<3, 3> curved = hessian_contraction(c.control, inputs, force, moment);
     Mat<3, 3> found;
@@ -264,7 +264,7 @@ TEST_CASE("the curvature of a segment in space is that of its work") {
       down[k] -= h;
       const Vec<3> more = slope(in_space(up, inputs), force, moment),
                    less = slope(in_space(down, inputs), force, moment);
-      for (int r = 0; r < 3; ++r) {  // a turn's second derivative is taken to be symmetric
+      for (int r = 0; r < 3; ++r) {  // the second derivative of a rotation is symmetrised
         found(r, k) += (more[r] - less[r]) / (4 * h);
         found(k, r) += (more[r] - less[r]) / (4 * h);
       }
@@ -288,11 +288,11 @@ bool same_bits(const Rows& a, const Rows& b, int numbers, int segments) {
   return true;
 }
 
-TEST_CASE("wide registers change no bit" * doctest::skip(!__builtin_cpu_supports("avx2"))) {
+TEST_CASE("AVX2 gives the same bits" * doctest::skip(!__builtin_cpu_supports("avx2"))) {
   Random random(3);
   for (int n = 1; n < 40; ++n) {
     std::vector<double> coordinates(static_cast<std::size_t>(n));
-    for (double& one : coordinates) one = random.uniform(-1, 1);  // some beyond the range of the law
+    for (double& one : coordinates) one = random.uniform(-1, 1);  // some out of range of the law
     const double pull = random.uniform(0, 0.8);
     PaperLaw::Bends one(n), four(n);
     baseline::bend(n, coordinates.data(), pull, 10, 8, one);

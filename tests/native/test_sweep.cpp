@@ -1,4 +1,4 @@
-// The sweep against brute force: many moments of a way, many points of an edge, and distances of their own.
+// The sweep against brute force: many moments of a path, many points of an edge, and independent distances.
 #include <doctest/doctest.h>
 
 #include "distance.hpp"
@@ -20,18 +20,18 @@ Position<D> between(const Position<D>& a, const Position<D>& b, double part) {
 }
 
 template <int D>
-Position<D> beside(Random& random, const Position<D>& place, double distance) {
+Position<D> beside(Random& random, const Position<D>& origin, double distance) {
   return between(
-      place,
+      origin,
       [&] {
         Position<D> out = random.direction<D>();
-        out += place;
+        out += origin;
         return out;
       }(),
       distance);
 }
 
-// By how much the straight pieces of an outline lie inside it.
+// How far the chords of an outline lie inside it.
 template <int D>
 double sagitta(const Obstacle<D>& obstacle) {
   double longest = 0;
@@ -61,7 +61,7 @@ double deepest_of_sweep(const Obstacle<D>& obstacle, const Edge<D>& from, const 
   return deepest;
 }
 
-// Calls with obstacles of every shape and scale, a place on or in each, and its size.
+// Calls `check` with obstacles of every shape and scale, a point on or in each, and the size.
 template <int D, class Check>
 void each_obstacle(std::uint64_t seed, int trials, Check check) {
   Random random(seed);
@@ -77,7 +77,7 @@ void each_obstacle(std::uint64_t seed, int trials, Check check) {
       }
 }
 
-// A point outside an obstacle and near it.
+// A random point outside an obstacle and near it.
 template <int D>
 Position<D> outside(Random& random, const Obstacle<D>& obstacle, const Position<D>& at, double r) {
   for (;;) {
@@ -87,7 +87,7 @@ Position<D> outside(Random& random, const Obstacle<D>& obstacle, const Position<
   }
 }
 
-// Another one, no farther from it than this.
+// Another point outside, within a distance of this one.
 template <int D>
 Position<D> close_to(Random& random, const Obstacle<D>& obstacle, const Position<D>& point, double farthest) {
   for (;;) {
@@ -120,7 +120,7 @@ void paths() {
       const Position<D> to = k % 3 == 0 ? close_to(random, obstacle, from, 2 * r) : outside(random, obstacle, at, r);
       const double deepest = deepest_of_path(obstacle, from, to);
       if (deepest > 1.125 * allowed + sagitta(obstacle))
-        CHECK_FALSE(path_clear(obstacle, from, to));  // looked at every quarter of it
+        CHECK_FALSE(path_clear(obstacle, from, to));  // strides are at least a quarter of it
       if (deepest < 0.7 * allowed && obstacle.outline.empty()) CHECK(path_clear(obstacle, from, to));
       ++(deepest > 1.125 * allowed ? barred : clear);
       const Position<D> next = close_to(random, obstacle, from, harmless_path(obstacle));
@@ -160,22 +160,22 @@ void edges() {
   CHECK(barred > 100);
 }
 
-TEST_CASE("a depth is at least that of the point, but for the straight pieces of an outline, and none outside") {
+TEST_CASE("a depth is an upper bound, up to the chords of an outline, and at most 0 outside") {
   depths<2>();
   depths<3>();
 }
 
-TEST_CASE("the way of a point cuts no deeper than is allowed") {
+TEST_CASE("the path of a point is no deeper than allowed") {
   paths<2>();
   paths<3>();
 }
 
-TEST_CASE("an edge sweeps over no core") {
+TEST_CASE("an edge does not sweep over a core") {
   edges<2>();
   edges<3>();
 }
 
-TEST_CASE("sharp corners are looked at as well as round ones") {
+TEST_CASE("sharp corners are checked as well as round ones") {
   const Robot robot = make_robot<2>({});
   for (const double edge : {1e-1, 1e-3, 1e-6, 1e-9, 1e-12}) {
     const std::array numbers{edge,  -10.0, -10.0, 10.0, -10.0, 10.0, 10.0,  -10.0, 10.0,

@@ -102,7 +102,7 @@ struct SpatialLaw {
   // Finds the bendings of n segments and evaluates the law `ccr_bend`; false where a cable cannot have its length.
   static bool bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends);
 
-  // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_bow`.
+  // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_hessian_contraction`.
   static void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
                                   const Rows& adjoints, Rows& hessians);
 };

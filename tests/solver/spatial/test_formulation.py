@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from solver.spatial import Box, Capsule, Cylinder, HalfSpace, Sphere
-from solver.spatial.formulation import bend_function, bow_function, closure_function, square_angle
+from solver.spatial.formulation import bend_function, hessian_contraction_function, closure_function, square_angle
 
 A, LENGTH = 8.0, 10.0
 HOLES = np.array([[A, -A * math.sin(0.3)], [0.0, A * math.cos(0.3)]])
-CLOSURE, BEND, BOW = closure_function(), bend_function(), bow_function()
+CLOSURE, BEND, HESSIAN_CONTRACTION = closure_function(), bend_function(), hessian_contraction_function()
 STEP = 1e-6
 
 
@@ -73,7 +73,7 @@ def test_curvature(segment):
     control, pulls = segment
     force, moment = np.array([0.3, -0.2, 0.5]), np.array([0.7, 0.4, -0.6])
     bending, middle = bend(control, pulls)
-    curvature = BOW(control, bending, pulls, LENGTH, HOLES, force, moment).full().reshape(3, 3)
+    curvature = HESSIAN_CONTRACTION(control, bending, pulls, LENGTH, HOLES, force, moment).full().reshape(3, 3)
 
     def work(at):
         _, law = bend(at, pulls)
