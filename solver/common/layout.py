@@ -90,7 +90,7 @@ class Layout:
             self.size = field.offset + field.size
 
 
-# TODO: go when ccr_gym/bodies.py takes the fields of its layout.
+# Read by ccr_gym/bodies.py, which has no layout at hand where it declares what actions move.
 CABLE, LENGTH, TENSION = (getattr(Layout(PLANE, 1, 1, 1, 0), name).at for name in ("cables", "length", "tensions"))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.spatial import Box, Capsule, Cylinder, HalfSpace, Sphere
-from solver.spatial.formulation import bend_function, hessian_contraction_function, closure_function, square_angle
+from solver.spatial.formulation import bend_function, closure_function, hessian_contraction_function, square_angle
 
 A, LENGTH = 8.0, 10.0
 HOLES = np.array([[A, -A * math.sin(0.3)], [0.0, A * math.cos(0.3)]])
