@@ -20,15 +20,13 @@ from ccr_gym.checks import (
 )
 from ccr_gym.episodes import EpisodeBatch, ForceReading, PrivilegedState
 from ccr_gym.observation import FORCE_SCALE_N
-from ccr_gym.rendering import Frame, Renderer, draw_plane
+from ccr_gym.rendering import Frame, Renderer
 from ccr_gym.reward import TERMS
 from ccr_gym.settings import Settings
-from ccr_gym.spatial_rendering import draw_space
 from ccr_gym.tasks import SET_POINT, Assignment, Task, check_task
 from solver import Scene
 
 Observation = np.ndarray | dict[str, np.ndarray]
-WORLDS = {2: draw_plane, 3: draw_space}
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
 
 
@@ -115,7 +113,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         if self.render_mode is None or not self._started:
             gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human', and a reset")
             return None
-        self._renderer = self._renderer or Renderer(self.metadata["render_fps"], WORLDS[self.task.body.model.space])
+        self._renderer = self._renderer or Renderer(self.metadata["render_fps"])
         reading = self._episodes.read(0)
         frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, FORCE_SCALE_N)
         if self.render_mode == "rgb_array":

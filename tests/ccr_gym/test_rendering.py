@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
-from ccr_gym.rendering import LAYOUT, PALETTE, Camera, Frame, Renderer, arrow_of
+from ccr_gym.rendering import Frame, Renderer
+from ccr_gym.rendering.camera import Camera
+from ccr_gym.rendering.palette import LAYOUT, PALETTE
+from ccr_gym.rendering.planar import reaction_arrow
 from solver import Circle, Equilibrium, HalfPlane, Obstacle, Robot, Scene, Solver
 
 SIZE = (640, 640)
@@ -140,7 +143,7 @@ def test_arrow_is_the_reaction_on_the_obstacle(renderer: Renderer, touching: Equ
 )
 def test_arrow_length_follows_the_scale_and_is_limited(force: float, length: float) -> None:
     camera = Camera.fit(500, 500)
-    vector = arrow_of(camera, np.array([0.0, force]), 0.2)
+    vector = reaction_arrow(camera, np.array([0.0, force]), 0.2)
     np.testing.assert_allclose(vector, [0, length * LAYOUT.arrow_mm * camera.scale], atol=1e-12)
 
 
