@@ -36,14 +36,14 @@ def teach(envs: Any, observation: Observation) -> np.ndarray:
     obstacle before anything touches. In space both cables move along the way of the search, an insertion stays.
     """
     truth: PrivilegedState = envs.get_attr("privileged_state", [0])[0]
-    settings, body = envs.get_attr("settings", [0])[0], envs.get_attr("task", [0])[0].body
+    full = envs.get_attr("action_spec", [0])[0].increment_mm
     way = search(observation).astype(float)
     force = np.linalg.norm(truth.force, axis=1)
-    tried = np.linalg.norm(envs.env_method("probe", truth.places + PROBE_MM * way, indices=[0])[0], axis=1)
+    tried = np.linalg.norm(envs.env_method("probe", truth.actuated_mm + PROBE_MM * way, indices=[0])[0], axis=1)
     slope = np.maximum(np.abs(tried - force) / PROBE_MM, LEAST_SLOPE)
     lacking = np.where(np.abs(truth.goal - force) < REACHED_N, 0.0, truth.goal - force)
     moves = (lacking / slope)[:, None] * way
-    acts = effort(moves, truth, body.increments(settings))
+    acts = effort(moves, truth, full)
     return np.where(force[:, None] > 0, acts, way.astype(np.float32))
 
 

@@ -51,7 +51,7 @@ class NewtonController:
     def reset(self, env: Any = None) -> None:
         """Take the environment whose equilibrium is known."""
         self._env, self._fit = env, PRIOR.copy()
-        self._lag = Lag(1, env.get_wrapper_attr("task").body.model.cables)
+        self._lag = Lag(1, env.get_wrapper_attr("action_spec").cables)
         self._tare.forget()
         self._felt.clear()
 
@@ -69,28 +69,28 @@ class NewtonController:
             slopes, lacking = slopes @ (truth.force / size)[:, None], np.array([truth.goal - size])
         else:
             lacking = truth.goal - truth.force
-        (low, high), free = task.body.bounds(settings), np.ones(len(slopes), bool)
+        (_, low, high, full), free = self._env.get_wrapper_attr("action_spec"), np.ones(len(slopes), bool)
         for _ in free:  # a motor at its bound leaves the rest to the other
             damped = slopes @ slopes.T + (truth.rigidity_ratio * self.damping) ** 2 * np.eye(len(slopes))
             increments = np.linalg.solve(damped, slopes @ lacking)
-            free &= np.where(increments > 0, truth.motors < high, truth.motors > low)
+            free &= np.where(increments > 0, truth.motor_mm < high, truth.motor_mm > low)
             slopes = slopes * free[:, None]
-        return effort(self.gain * increments, truth, task.body.increments(settings))
+        return effort(self.gain * increments, truth, full)
 
     def _seen(self, observation: Observation, truth: PrivilegedState, settings: Any) -> PrivilegedState:
         """What it takes for the truth if it does not know what is hidden."""
         force, cables = truth.force / truth.rigidity_ratio, observation["cable"].size  # the force of the model
         vector = FORCE_SCALE_N * observation["desired_force"].astype(float)
         goal: Any = vector if vector.size > 1 else set_points(observation, 1).item()
-        self._lag.see(truth.motors[None, :cables], seen_cables(observation, settings.robot)[None])
+        self._lag.see(truth.motor_mm[None, :cables], seen_cables(observation, settings.robot)[None])
         self._felt.append(float(np.linalg.norm(force)))
         measured = self._tare.force(observation)
         if measured is not None:
             then = self._felt[max(-1 - self._lag.latency.item(), -len(self._felt))]
             self._fit = self._fit + then * np.array([np.linalg.norm(measured), then])
         ratio = self._fit[0] / self._fit[1]
-        slack = np.where(np.arange(truth.slack.size) < cables, self._lag.slack, 0.0)  # an insertion has none
-        return PrivilegedState(ratio * force, ratio, goal, truth.places, truth.motors, slack)
+        slack = np.where(np.arange(truth.half_backlash_mm.size) < cables, self._lag.slack, 0.0)  # an insertion has none
+        return PrivilegedState(ratio * force, ratio, goal, truth.actuated_mm, truth.motor_mm, slack)
 
     def _slopes(self, truth: PrivilegedState, target: int | None, insertion: bool) -> np.ndarray:
         """Slopes of the force that counts in what the actions move, ``(actions, d)`` [N/mm]."""
@@ -107,5 +107,5 @@ class NewtonController:
     def _tried(self, truth: PrivilegedState) -> np.ndarray:
         """The same of the true force, from trial moves that are solved exactly, which is faster."""
         probe = self._env.get_wrapper_attr("probe")
-        trials = truth.places + PROBE_MM * np.eye(truth.places.size)
+        trials = truth.actuated_mm + PROBE_MM * np.eye(truth.actuated_mm.size)
         return np.array([(probe(places) - truth.force) / PROBE_MM for places in trials])

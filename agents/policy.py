@@ -54,7 +54,7 @@ def effort(moves: np.ndarray, truth: PrivilegedState, increments: np.ndarray) ->
         truth: Places, motors and slack.
         increments: What full actions move, ``(actions,)`` [mm].
     """
-    play = np.where(moves == 0, 0.0, truth.places + np.copysign(truth.slack, moves) - truth.motors)
+    play = np.where(moves == 0, 0.0, truth.actuated_mm + np.copysign(truth.half_backlash_mm, moves) - truth.motor_mm)
     wanted = (moves + play) / increments
     return np.asarray(wanted / np.maximum(1.0, np.abs(wanted).max(axis=-1, keepdims=True)), np.float32)
 

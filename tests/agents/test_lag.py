@@ -25,12 +25,12 @@ def test_it_finds_latency_and_play_and_where_the_cables_are(env_id):
     lag, generator = Lag(12, observation["cable"].shape[1]), np.random.default_rng(1)
     for step in range(40):
         lag.see(settings.cable_limit_mm * observation["cable"].astype(float), seen_cables(observation, settings.robot))
-        cables = envs.privileged_state.places[:, : lag.places.shape[1]]
+        cables = envs.privileged_state.actuated_mm[:, : lag.places.shape[1]]
         if step > 20:
             assert lag.places == pytest.approx(cables, abs=0.02)
         pull = generator.uniform(-0.6, 1, envs.action_space.shape) if step > 10 else np.ones(envs.action_space.shape)
         observation, *_ = envs.step(pull.astype(np.float32))
     assert np.array_equal(lag.latency, sensors._latency)
-    assert lag.slack == pytest.approx(sensors._play / 2, abs=0.006)  # the step of the grid
+    assert lag.slack == pytest.approx(sensors._backlash_mm / 2, abs=0.006)  # the step of the grid
     lag.forget([3])
     assert lag._errors[3].max() == 0 < lag._errors[4].max()

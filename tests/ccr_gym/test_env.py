@@ -10,8 +10,7 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import ccr_gym
 from agents.policy import search
-from ccr_gym.environments import PushObstacleEnv
-from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym import FORCE_SCALE_N, PushObstacleEnv
 from solver import Circle, Scene, Status
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as nps
 
 import ccr_gym
-import ccr_gym.tasks
+import ccr_gym.sampling
 from ccr_gym import RewardWeights, Sensing
 from solver import Circle, HalfPlane, Scene
 from solver.spatial import Sphere
@@ -20,7 +20,7 @@ from solver.spatial import Sphere
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 EVERY_FORM = pytest.mark.parametrize("count", [None, 3])  # of environments; one of them on its own
 fuzz = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-DRAWS = 20
+SAMPLES = 20
 SLIPS = "could slip between points"
 OPTIONS = ("seed", "options", "scene", "desired_force", "reset_mask", "overlaps the straight robot", SLIPS)
 UNREACHABLE = "widen the task's ranges"
@@ -99,7 +99,7 @@ def words(name, kwargs):
 @EVERY_FORM
 @EVERY_ID
 def test_arguments(env_id, count, monkeypatch):
-    monkeypatch.setattr(ccr_gym.tasks, "MAX_DRAWS", DRAWS)
+    monkeypatch.setattr(ccr_gym.sampling, "MAX_SAMPLES", SAMPLES)
 
     @settings(fuzz, max_examples=150)
     @given(st.sampled_from(arguments(env_id, count)), anything)
@@ -134,7 +134,7 @@ def operations(env_id, count):
     """Resets and steps, most of them with something odd."""
     env = build(env_id, count)
     shape = env.action_space.shape
-    single = scenes(env.task.body.model.space) | scenes(2) | odd
+    single = scenes(env.task.adapter.space) | scenes(2) | odd
     given_scene = st.fixed_dictionaries({}, optional={"scene": single, "desired_force": numbers | odd, "seen": odd})
     mask = st.fixed_dictionaries({}, optional={"reset_mask": nps.arrays("?", st.integers(0, 4)) | odd, "a": odd})
     seeds = st.integers(0, 9) | numbers | odd | st.lists(st.integers(0, 9) | st.none() | numbers, max_size=4)

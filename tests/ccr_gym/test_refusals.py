@@ -10,10 +10,10 @@ import pytest
 from comparison import same
 
 import ccr_gym
-from ccr_gym import ContactEnv, ContactVectorEnv, RewardWeights, Sensing, Task
+from ccr_gym import FORCE_SCALE_N, Assignment, ContactEnv, ContactVectorEnv, RewardWeights, Sensing, Task
 from ccr_gym.checks import check_range, checked
-from ccr_gym.observation import FORCE_SCALE_N
-from ccr_gym.tasks import MAX_DRAWS, Assignment, uniform
+from ccr_gym.sampling import MAX_SAMPLES
+from ccr_gym.tasks import uniform
 from solver import Circle, Scene
 from solver.spatial import Sphere
 
@@ -77,13 +77,13 @@ def scenes_of(env_id):
         ("CCR/SoftObstacle-v0", {"spring": (0, 0.1)}, "spring is"),
         ("CCR/SoftObstacle-v0", {"spring": (0.1, INF)}, "spring is"),
         ("CCR/InsertAndPush-v0", {"y_mm": (130, 75)}, "y_mm is"),
-        ("CCR/SpatialPush-v0", {"cylinders": 7}, "cylinders is 7; it must be a number from 0 to 1"),
-        ("CCR/SpatialPush-v0", {"tilt": -0.1}, "tilt is"),
-        ("CCR/SpatialPush-v0", {"aside": 2}, "aside is"),
+        ("CCR/SpatialPush-v0", {"cylinder_fraction": 7}, "cylinder_fraction is 7; it must be a number from 0 to 1"),
+        ("CCR/SpatialPush-v0", {"max_tilt": -0.1}, "max_tilt is"),
+        ("CCR/SpatialPush-v0", {"max_ramp_angle": 2}, "max_ramp_angle is"),
         ("CCR/SpatialPush-v0", {"distance_mm": (-1, 60)}, "distance_mm is"),
         ("CCR/SpatialPush-v0", {"height_mm": (1, NAN)}, "height_mm is"),
-        ("CCR/SpatialPush-v0", {"radius_mm": (2.5, 16), "cylinders": 0}, "Sphere.*could slip"),
-        ("CCR/SpatialPush-v0", {"radius_mm": (2.5, 16), "cylinders": 1}, "Cylinder.*could slip"),
+        ("CCR/SpatialPush-v0", {"radius_mm": (2.5, 16), "cylinder_fraction": 0}, "Sphere.*could slip"),
+        ("CCR/SpatialPush-v0", {"radius_mm": (2.5, 16), "cylinder_fraction": 1}, "Cylinder.*could slip"),
         ("CCR/SpatialPush-v0", {"force_vector": "no"}, "force_vector is 'no'; it must be True or False"),
         ("CCR/SpatialPush-v0", {"force_vector": 1}, "force_vector is 1"),
     ],
@@ -251,7 +251,10 @@ BAD_RESETS = [
         ({"seed": 5, "options": {"scene": scene_of(PUSH), "desired_force": force}}, "desired_force is")
         for force in (-0.1, 0.0, 0.6, NAN, INF, "0.1", True, 0.1j, None, [0.1], (0.1, 0.1), 1e300)
     ),
-    ({"seed": 5, "options": {"scene": Scene([]), "desired_force": 0.1}}, "the scene has 0 obstacles; it needs 1"),
+    (
+        {"seed": 5, "options": {"scene": Scene([]), "desired_force": 0.1}},
+        "the scene has 0 obstacles; it must have at least 1",
+    ),
     (
         {"seed": 5, "options": {"scene": Scene([Circle(center=(0, 90), radius=15)]), "desired_force": 0.1}},
         "overlaps the straight robot",
@@ -286,7 +289,7 @@ class Fickle(Task):
     mood: list  # the next draws, consumed one by one; a circle when none is left
     x_mm: tuple[float, float] = checked((40.0, 50.0), check_range, low=0)
 
-    def draw(self, robot, generator):
+    def sample(self, robot, generator):
         x, force = uniform(generator, self.x_mm, (0.05, 0.1))
         plain = Assignment(Scene([Circle(center=(x, 104.0), radius=15)]), force)
         return self.mood.pop()(plain) if self.mood else plain
@@ -301,14 +304,14 @@ def raising(_):
 
 
 MOODS = {
-    "no assignment": (lambda plain: None, TypeError, "what the task draws is None; it must be an Assignment"),
-    "no scene": (lambda plain: plain._replace(scene=[]), TypeError, "scene of a draw is"),
+    "no assignment": (lambda plain: None, TypeError, "what the task samples is None; it must be an Assignment"),
+    "no scene": (lambda plain: plain._replace(scene=[]), TypeError, "sampled scene is"),
     "two obstacles": (lambda plain: plain._replace(scene=scene_of(PUSH, 2)), ValueError, "a Scene of 1 obstacles"),
-    "no force": (lambda plain: plain._replace(desired_force=NAN), ValueError, "desired_force of a draw is nan"),
-    "large force": (lambda plain: plain._replace(desired_force=0.51), ValueError, "desired_force of a draw is 0.51"),
-    "no pull": (lambda plain: plain._replace(pull=(1.0, 2.0)), ValueError, "pull of a draw"),
-    "short course": (lambda plain: plain._replace(course=np.ones(3)), ValueError, "course of a draw"),
-    "wild course": (lambda plain: plain._replace(course=np.full(128, 2.0)), ValueError, "course of a draw"),
+    "no force": (lambda plain: plain._replace(desired_force=NAN), ValueError, "sampled desired_force is nan"),
+    "large force": (lambda plain: plain._replace(desired_force=0.51), ValueError, "sampled desired_force is 0.51"),
+    "no pull": (lambda plain: plain._replace(pull=(1.0, 2.0)), ValueError, "sampled pull"),
+    "short profile": (lambda plain: plain._replace(profile=np.ones(3)), ValueError, "sampled profile"),
+    "wild profile": (lambda plain: plain._replace(profile=np.full(128, 2.0)), ValueError, "sampled profile"),
     "an error": (raising, Odd, "odd"),
 }
 
@@ -351,7 +354,7 @@ def test_when_no_scene_is_found_nothing_has_changed():
     for _ in range(30):
         same(env.step(action), twin.step(action))
     for kwargs in ({}, {"seed": 4}, {"options": {"reset_mask": np.array([True, False, True])}}):
-        task.mood[:] = 3 * MAX_DRAWS * [far]
+        task.mood[:] = 3 * MAX_SAMPLES * [far]
         with pytest.raises(RuntimeError, match="widen"):
             env.reset(**kwargs)
         task.mood.clear()
@@ -457,7 +460,7 @@ def test_nothing_is_asked_before_a_reset_and_closing_is_harmless(env_id):
                 ask()
         env.reset(seed=0)
         for wrong in (places[..., :0], np.full(places.shape, NAN), "here", None):
-            with pytest.raises(ValueError, match="places is"):
+            with pytest.raises(ValueError, match="actuated_mm is"):
                 env.probe(wrong)
         assert np.isfinite(env.probe(places)).all()
         env.close()

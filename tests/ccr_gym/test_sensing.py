@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 import ccr_gym
-from ccr_gym import Sensing
-from ccr_gym.observation import FORCE_SCALE_N
-from ccr_gym.tasks import in_test_split
+from ccr_gym import FORCE_SCALE_N, Sensing
+from ccr_gym.sampling import in_test_split
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 EXACT = {name: (0.0, 0.0) for name in ("noise_n", "bias_n", "backlash_mm", "tendon_loss")} | {
@@ -83,8 +82,8 @@ def test_the_truth_of_many_is_that_of_each_and_trying_a_move_tells_its_force(env
         envs.step(actions)
         for env, action in zip(singles, actions, strict=True):
             env.step(action)
-        assert envs.probe(envs.privileged_state.places) == pytest.approx(envs.privileged_state.force, abs=1e-6)
-        assert singles[0].probe(singles[0].privileged_state.places) == pytest.approx(
+        assert envs.probe(envs.privileged_state.actuated_mm) == pytest.approx(envs.privileged_state.force, abs=1e-6)
+        assert singles[0].probe(singles[0].privileged_state.actuated_mm) == pytest.approx(
             singles[0].privileged_state.force, abs=1e-6
         )
 

@@ -4,8 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from ccr_gym.environments import SpatialPushEnv
-from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym import FORCE_SCALE_N, SpatialPushEnv
 from solver import Circle, Scene
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
@@ -93,5 +92,5 @@ def test_settings():
     assert observation["nodes"].shape == (39,)
     with pytest.raises(ValueError, match="in space it must be 'native'"):
         make(backend="casadi")
-    with pytest.raises(ValueError, match="of the plane"):
+    with pytest.raises(ValueError, match="not in the plane"):
         make().reset(options={"scene": Scene([Circle(center=(44, 104), radius=15)]), "desired_force": 0.1})
