@@ -15,11 +15,11 @@ from ccr_gym.checks import require
 from ccr_gym.observation import Observer
 from ccr_gym.quantities import EnvIndex, Quantity, as_scalar, norm, operations
 from ccr_gym.reward import SUCCESS_ERROR, TERMS, reward_terms
-from ccr_gym.sampling import sample_feasible
+from ccr_gym.sampling import check_robot, sample_feasible
 from ccr_gym.scales import AHEAD
 from ccr_gym.sensing import SensorModel
 from ccr_gym.settings import AnySettings
-from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment, check_robot
+from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment
 from solver import Equilibrium
 from solver.common.batch import BaseBatch
 from solver.spatial import SpatialEquilibrium

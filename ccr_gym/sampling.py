@@ -10,6 +10,7 @@ from ccr_gym.scales import FORCE_SCALE_N
 from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment, check_force
 from solver import Robot, Scene
 from solver.common.batch import BaseBatch
+from solver.common.checks import check_core
 from solver.spatial import SpatialRobot
 
 MAX_SAMPLES = 1000
@@ -65,6 +66,19 @@ def sample_feasible(
         f"none of {MAX_SAMPLES} samples of {task} can be pushed as desired within {cable_limit_mm} mm of cable; "
         "widen the task's ranges or the cable limit"
     )
+
+
+def check_robot(task: AnyTask, robot: Robot | SpatialRobot) -> None:
+    """Raise an error if an obstacle of the task could slip through the robot, or its narrowest obstacles are invalid.
+
+    Raises:
+        ValueError: Naming the task, the obstacle, its width and what the robot needs.
+    """
+    try:
+        for scene in task.narrowest_scenes():
+            check_core(robot, scene)
+    except ValueError as error:
+        raise ValueError(f"the narrowest obstacles of {task} are refused: {error}") from error
 
 
 def in_test_split(scene: Scene) -> bool:

@@ -22,7 +22,6 @@ from ccr_gym.checks import (
 from ccr_gym.scales import FORCE_SCALE_N
 from ccr_gym.settings import RobotT
 from solver import Circle, HalfPlane, Robot, Scene
-from solver.common.checks import check_core
 from solver.common.scene import MAX_OBSTACLES
 from solver.common.validation import SMALLEST, whole
 from solver.spatial import Cylinder, SpatialRobot, Sphere
@@ -331,19 +330,6 @@ def check_task(task: object) -> None:
     whole("steps of the task", task.steps, 1, MAX_STEPS)
     if task.target is not None:
         whole("target of the task", task.target, 0, task.obstacles - 1)
-
-
-def check_robot(task: AnyTask, robot: Robot | SpatialRobot) -> None:
-    """Raise an error if an obstacle of the task could slip through the robot, or its narrowest obstacles are invalid.
-
-    Raises:
-        ValueError: Naming the task, the obstacle, its width and what the robot needs.
-    """
-    try:
-        for scene in task.narrowest_scenes():
-            check_core(robot, scene)
-    except ValueError as error:
-        raise ValueError(f"the narrowest obstacles of {task} are refused: {error}") from error
 
 
 def _smallest_circle(x_mm: Range, y_mm: Range, radius_mm: Range) -> Circle:

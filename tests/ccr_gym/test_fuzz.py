@@ -1,4 +1,4 @@
-"""Anything given to any public entry of an environment works, or is refused by name and leaves all as it was."""
+"""Whatever is passed to an environment works, or is refused by name and changes nothing."""
 
 from dataclasses import fields
 
@@ -48,7 +48,7 @@ anything = numbers | odd | pairs | ascending | st.lists(pairs, min_size=3, max_s
 
 
 def build(env_id, count, /, **kwargs):
-    if "render_mode" in kwargs and count is None:  # in other words than Gymnasium refuses it
+    if "render_mode" in kwargs and count is None:  # Gymnasium refuses it with a message of its own
         return load_env_creator(gymnasium.spec(env_id).entry_point)(**kwargs)
     if count is None:
         return gymnasium.make(env_id, disable_env_checker=True, **kwargs).unwrapped
@@ -57,7 +57,7 @@ def build(env_id, count, /, **kwargs):
 
 
 def named(error, *words):
-    """One of some words stands in a message."""
+    """Assert that a message contains one of some words."""
     assert any(word in str(error) for word in words), error
 
 
@@ -68,7 +68,7 @@ def check_step(env, step):
 
 
 def arguments(env_id, count):
-    """Names of all arguments of an environment, in lists of those that share a mapping."""
+    """Return the paths of all arguments of an environment: names, and names within mappings."""
     env = build(env_id, None)
     names = [field.name for field in fields(env.settings)] + ["task", "render_mode"]
     if count is not None:
@@ -81,7 +81,7 @@ def arguments(env_id, count):
 
 
 def given_as(env_id, name, value):
-    """Keyword arguments with a value in the place of a name; a robot has no defaults, so it keeps its other fields."""
+    """Return keyword arguments with a value at a path; a robot has no defaults, so it keeps its other fields."""
     if len(name) == 1:
         return {name[0]: value}
     robot = build(env_id, None).settings.robot
@@ -90,7 +90,7 @@ def given_as(env_id, name, value):
 
 
 def words(name, kwargs):
-    """What a refusal may name: the argument, or what it fits ill with of the same robot."""
+    """Return what a message may name: the argument, or another field of the same robot."""
     if name[0] == "robot" and len(name) == 2:
         return tuple(kwargs["robot"])
     return ("num_envs" if name == ("count",) else name[0], *name[1:])
@@ -131,7 +131,7 @@ def scenes(space):
 
 
 def operations(env_id, count):
-    """Resets and steps, most of them with something odd."""
+    """Return resets and steps, most of them with odd arguments."""
     env = build(env_id, count)
     shape = env.action_space.shape
     single = scenes(env.task.adapter.space) | scenes(2) | odd

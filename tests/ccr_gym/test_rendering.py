@@ -81,7 +81,7 @@ def test_pictures_are_separate_arrays(renderer: Renderer, free: Equilibrium, tou
     np.testing.assert_array_equal(first, kept)
 
 
-def test_circle_is_where_it_should_be(renderer: Renderer, free: Equilibrium) -> None:
+def test_circle_is_drawn_at_its_position(renderer: Renderer, free: Equilibrium) -> None:
     picture = renderer.draw(frame_of(free))
     (x, y), radius = FREE.center, FREE.radius
     for across, up in ((0, 0), (0.8, 0), (-0.8, 0), (0, 0.8), (0, -0.8)):
@@ -168,7 +168,7 @@ def test_gauge_bars_follow_the_forces(renderer: Renderer, free: Equilibrium) -> 
     assert bars(0.1) == [pytest.approx(0.5 * full, rel=0.1), pytest.approx(0.4 * full, rel=0.1)]
 
 
-def test_force_that_is_not_finite_is_drawn_without_complaint(renderer: Renderer, touching: Equilibrium) -> None:
+def test_non_finite_forces_are_not_drawn(renderer: Renderer, touching: Equilibrium) -> None:
     frame = frame_of(touching, (-0.05, 0.05))
     for value in (np.nan, np.inf):
         renderer.draw(replace(frame, force_est=np.array([value, 0.0])))
@@ -192,7 +192,7 @@ def test_window_shows_the_picture(monkeypatch: pytest.MonkeyPatch, free: Equilib
     renderer.close()
 
 
-def test_closing_one_renderer_leaves_the_others_drawing(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
+def test_closing_one_renderer_keeps_the_others(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     first, second = Renderer(fps=1000, size=SIZE), Renderer(fps=1000, size=(300, 300))
     first.show(frame_of(free))
@@ -203,7 +203,7 @@ def test_closing_one_renderer_leaves_the_others_drawing(monkeypatch: pytest.Monk
     assert first.draw(frame_of(free)).shape == (640, 640, 3)
 
 
-def test_window_keeps_to_its_rate(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
+def test_window_keeps_its_frame_rate(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     from time import perf_counter
 
