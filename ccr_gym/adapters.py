@@ -46,7 +46,7 @@ Features = dict[str, Feature]
 
 
 class RobotAdapter(ABC, Generic[SettingsT]):
-    """What environments need to know of a robot model: its actions, observed features and force estimate.
+    """The interface between environments and a robot model: actions, observed features and force estimate.
 
     Attributes:
         settings_class: Settings of the environments.
@@ -58,6 +58,7 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         layout: Memory layout of an equilibrium block.
         actions: The actuated coordinates.
         actuated_columns: Their columns in an equilibrium block.
+        clearance_column: Column of the smallest gap in an equilibrium block.
 
     Args:
         settings: Settings of the environment.
@@ -73,7 +74,9 @@ class RobotAdapter(ABC, Generic[SettingsT]):
     def __init__(self, settings: SettingsT, layout: Layout) -> None:
         self.settings, self.layout = settings, layout
         self.actions = self.action_spec(settings)
-        self.actuated_columns = _index(self._actuated(np.arange(layout.size)))
+        columns = np.arange(layout.size)
+        self.actuated_columns = _index(self._actuated(columns))
+        self.clearance_column = _index(layout.clearance(columns))
 
     @classmethod
     @abstractmethod
@@ -136,14 +139,14 @@ class RobotAdapter(ABC, Generic[SettingsT]):
 
 
 class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
-    """A planar robot with one cable, whatever its actions move."""
+    """A planar robot with one cable; subclasses say what its actions move."""
 
     space, cables = 2, 1
 
     def __init__(self, settings: PlanarSettingsT, layout: Layout) -> None:
         super().__init__(settings, layout)
-        numbers = np.arange(layout.size)
-        self._cable, self._tension = layout.cables(numbers).item(), layout.tensions(numbers).item()
+        columns = np.arange(layout.size)
+        self._cable, self._tension = layout.cables(columns).item(), layout.tensions(columns).item()
 
     @classmethod
     def make_batch(cls, settings: PlanarSettingsT, count: int, obstacles: int, threads: int) -> BaseBatch:
@@ -164,7 +167,7 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
         if x == y == 0 if one else not force_true.any():
             return force_est
         friction = self.settings.estimator_friction
-        x, y = x - friction * y, y + friction * x
+        x, y = x - friction * y, y + friction * x  # n + μ t, with t the normal turned by +90°
         slopes = self.layout.tip_slopes(blocks)
         load = blocks[..., self._tension] - self.layout.onset(blocks)[..., 0]
         if one:
@@ -290,9 +293,9 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
     def pose_features(self) -> Features:
         """Return the position of every node, and the first and last axis of its disk."""
         robot: SpatialRobot = self.settings.robot
-        numbers = np.arange(self.layout.size)
-        axes = np.swapaxes(self.layout.frames(numbers)[:, :, [0, 2]], 1, 2).ravel()
-        return {"frames": Feature(axes, 1.0), "nodes": Feature(self.layout.nodes(numbers).ravel(), 1 / robot.length_mm)}
+        columns = np.arange(self.layout.size)
+        axes = np.swapaxes(self.layout.frames(columns)[:, :, [0, 2]], 1, 2).ravel()
+        return {"frames": Feature(axes, 1.0), "nodes": Feature(self.layout.nodes(columns).ravel(), 1 / robot.length_mm)}
 
     def obstacle_features(self, scene: Scene) -> np.ndarray:
         """Return centre [mm], axis direction and scaled radius of the first obstacle, zeros where it has none."""

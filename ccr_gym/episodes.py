@@ -265,7 +265,7 @@ class EpisodeBatch:
 
     def rewards(self, reading: ForceReading, index: int | slice = ALL) -> tuple[Quantity, ...]:
         """Return the reward terms of the last step."""
-        clearance = as_scalar(reading.blocks[..., self._layout.clearance_at], index)
+        clearance = as_scalar(reading.blocks[..., self.adapter.clearance_column], index)
         actions = self._last_actions[index]
         effort = self.adapter.mean_square(as_scalar(actions, index) if self._last_actions.ndim == 1 else actions)
         weights, force, desired = self._settings.weights, reading.force, reading.desired

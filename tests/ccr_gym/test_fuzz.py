@@ -18,7 +18,7 @@ from solver import Circle, HalfPlane, Scene
 from solver.spatial import Sphere
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
-EVERY_FORM = pytest.mark.parametrize("count", [None, 3])  # of environments; one of them on its own
+EVERY_FORM = pytest.mark.parametrize("count", [None, 3])  # number of environments; None for a single one
 fuzz = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 SAMPLES = 20
 SLIPS = "could slip between points"
