@@ -1,4 +1,4 @@
-"""Exact optimisation kinematics of a cable-driven continuum robot among obstacles."""
+"""Exact optimisation-based kinematics of a cable-driven continuum robot among obstacles."""
 
 from solver.cache.memo import TransitionMemo
 from solver.common.equilibrium import Optimality, Residuals

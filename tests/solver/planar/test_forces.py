@@ -9,7 +9,7 @@ import pytest
 from solver import Capsule, Circle, Ellipse, Equilibrium, HalfPlane, Polygon, Robot, Scene, Solver
 from solver.common.layout import TENSION
 from solver.planar.forces import VirtualWork, force_true, onset_tension
-from solver.planar.formulation import limits, node_derivatives
+from solver.planar.formulation import node_derivatives, robot_inequality_count
 from solver.planar.free import fitted_slopes, tip_slopes
 from solver.planar.layout import layout
 from solver.planar.robot import MODELS
@@ -60,7 +60,11 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(model, scene):
     # Admissible: backbone and disks keep their lengths; the cable shortens, by 1/n in each segment or as a whole.
     shortening = np.zeros(3 * n)
     if model == "rod":
-        held, gaps, shortening = np.vstack([held, gaps[:1]]), gaps[limits(robot) :], np.r_[shortening, 1.0]
+        held, gaps, shortening = (
+            np.vstack([held, gaps[:1]]),
+            gaps[robot_inequality_count(robot) :],
+            np.r_[shortening, 1.0],
+        )
     else:
         shortening[n : 2 * n] = -1.0 / n
     null = np.linalg.svd(held)[2][len(held) :]

@@ -9,7 +9,7 @@ import pytest
 
 from solver import Circle, ReferenceSolver, Robot, Scene, Sensitivity, Solver, Status, sensitivity
 from solver.planar.forces import force_true
-from solver.planar.formulation import disk_gap_function, limits, node_problem
+from solver.planar.formulation import disk_gap_function, node_problem, robot_inequality_count
 
 CIRCLE = Circle(center=(42, 143), radius=28)
 SIZES = pytest.mark.parametrize(("length", "radius", "thickness"), [(10, 8, 0), (15, 60, 0), (15, 40, 2), (10, 25, 3)])
@@ -93,12 +93,12 @@ def test_gaps_of_the_node_problem_are_those_of_the_law(radius, thickness, before
     values, turns = gaps(unknowns, parameters).full().ravel(), -np.diff(equilibrium.nodes[:, 2])
     law = disk_gap_function().map(robot.segments)
     expected = [law(side * turns, robot.segment_mm, radius, thickness)[0, :].full().ravel() for side in (1, -1)]
-    assert limits(robot) == 1 + 2 * robot.segments
+    assert robot_inequality_count(robot) == 1 + 2 * robot.segments
     assert values.size == multipliers.size
-    assert values[1 : limits(robot)] == pytest.approx(np.concatenate(expected), abs=1e-10)
-    assert values[limits(robot) :] == pytest.approx(equilibrium.gaps[:, :, 1:].ravel(), abs=1e-9)
-    meeting = multipliers[1 : limits(robot)] > 0
-    assert values[1 : limits(robot)][meeting] == pytest.approx(0, abs=1e-9)
+    assert values[1 : robot_inequality_count(robot)] == pytest.approx(np.concatenate(expected), abs=1e-10)
+    assert values[robot_inequality_count(robot) :] == pytest.approx(equilibrium.gaps[:, :, 1:].ravel(), abs=1e-9)
+    meeting = multipliers[1 : robot_inequality_count(robot)] > 0
+    assert values[1 : robot_inequality_count(robot)][meeting] == pytest.approx(0, abs=1e-9)
     assert meeting.any()
 
 
@@ -157,7 +157,7 @@ def test_sensitivities_hold_the_disks_that_meet(radius, thickness, before, after
 
 def test_a_cable_that_shears_its_segments_has_no_disks_that_meet():
     robot = Robot.prototype()
-    assert limits(robot) == 0
+    assert robot_inequality_count(robot) == 0
     assert Solver(robot, Scene()).rest().disk_multipliers.size == 0
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from solver import Equilibrium, Robot, Solver, Status
 
-SCENES = json.loads((Path(__file__).parents[1] / "data" / "planar_uniform.json").read_text())
+SCENES = json.loads((Path(__file__).parents[2] / "data" / "planar_uniform.json").read_text())
 SCENES = {name: scene for name, scene in SCENES.items() if isinstance(scene, dict) and "states" in scene}
 POINTS = ["backbone", "cable"]
 

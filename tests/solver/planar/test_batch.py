@@ -104,12 +104,12 @@ def test_what_it_refuses():
         with pytest.raises(ValueError, match=message):
             BatchSolver(Robot.prototype(), *arguments)
     batch = BatchSolver(Robot.prototype(), 2, 1)
-    with pytest.raises(ValueError, match="as many obstacles as it was made for"):
+    with pytest.raises(ValueError, match="scene has 0 obstacles; each of the batch's has 1"):
         batch.assign(0, Scene())
     batch.assign(0, Scene([Circle(center=(44, 104), radius=15)]))
     with pytest.raises(ValueError, match="cable_mm is"):
         batch.step(np.array([1.0, 99.0]))
-    with pytest.raises(ValueError, match="robot 1 has not been assigned"):
+    with pytest.raises(ValueError, match="robot 1 has no scene"):
         batch.equilibrium(1)
 
 
