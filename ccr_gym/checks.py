@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from solver.common.validation import LARGEST, is_real, is_whole, number, sequence, shown
+from solver.common import validation
+from solver.common.validation import LARGEST, is_real, is_whole, shown
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -98,8 +99,8 @@ class Bounds:
         """Largest value, whether ``high`` or ``below`` bounds it."""
         return self.high if self.below is None else math.nextafter(self.below, self.low)
 
-    def __contains__(self, value: float) -> bool:
-        return self.low <= value <= self.largest
+    def __contains__(self, value: validation.Real) -> bool:
+        return bool(self.low <= value <= self.largest)
 
     def __str__(self) -> str:
         high = f"{self.high:.10g}" if self.below is None else f"below {self.below:.10g}"
@@ -119,7 +120,7 @@ def check_number(name: str, value: object, *, low: float = -LARGEST, high: float
     Raises:
         ValueError: If it is not a number, or out of bounds.
     """
-    return number(name, value, low, high, f"a number {Bounds(low, high, None, reason)}")
+    return validation.check_number(name, value, low, high, f"a number {Bounds(low, high, None, reason)}")
 
 
 def check_range(
@@ -148,8 +149,9 @@ def check_range(
     """
     bounds, is_number = Bounds(low, high, below, reason), is_whole if whole else is_real
     wanted = f"two {'whole numbers' if whole else 'numbers'} {bounds}, the smaller one first"
-    ends = sequence(name, value, wanted)
-    if not (len(ends) == 2 and all(is_number(end) and end in bounds for end in ends) and ends[0] <= ends[1]):
+    entries = validation.check_sequence(name, value, wanted)
+    ends = [end for end in entries if is_number(end) and end in bounds]
+    if not (len(ends) == len(entries) == 2 and ends[0] <= ends[1]):
         raise refusal(name, value, wanted)
     first, last = map(int if whole else float, ends)
     return first, last
@@ -158,7 +160,7 @@ def check_range(
 def check_ranges(name: str, value: object, *, bounds: Sequence[Mapping[str, float]]) -> tuple[tuple[float, float], ...]:
     """Return several ranges as a tuple, each checked against bounds of its own."""
     wanted = f"{len(bounds)} ranges of two numbers each"
-    ranges = sequence(name, value, wanted)
+    ranges = validation.check_sequence(name, value, wanted)
     if len(ranges) != len(bounds):
         raise refusal(name, value, wanted)
     return tuple(

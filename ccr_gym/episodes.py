@@ -316,7 +316,8 @@ class EpisodeBatch:
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:
         """Return a robot's present equilibrium; it is immutable."""
-        equilibrium: Equilibrium | SpatialEquilibrium = self.batch.equilibrium(robot)
+        equilibrium = self.batch.equilibrium(robot)
+        assert isinstance(equilibrium, Equilibrium | SpatialEquilibrium)
         return equilibrium
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from ccr_gym.checks import check_array, check_type, refusal
 from ccr_gym.scales import FORCE_SCALE_N
 from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment, check_force
-from solver import Robot, Scene
+from solver import Scene
 from solver.common.batch import BaseBatch
 from solver.common.checks import check_core
-from solver.spatial import SpatialRobot
+from solver.common.robot import AnyRobot
 
 MAX_SAMPLES = 1000
 RAMP_INCREMENT_MM = 0.5  # cable displacement between the equilibria of a ramp
@@ -68,7 +68,7 @@ def sample_feasible(
     )
 
 
-def check_robot(task: AnyTask, robot: Robot | SpatialRobot) -> None:
+def check_robot(task: AnyTask, robot: AnyRobot) -> None:
     """Raise an error if an obstacle of the task could slip through the robot, or its narrowest obstacles are invalid.
 
     Raises:
@@ -106,7 +106,7 @@ def _ramp(
     return found & (np.linalg.norm(reached, axis=1) <= FORCE_SCALE_N), reached
 
 
-def _sample_split(task: AnyTask, robot: Robot | SpatialRobot, generator: np.random.Generator, split: str) -> Assignment:
+def _sample_split(task: AnyTask, robot: AnyRobot, generator: np.random.Generator, split: str) -> Assignment:
     """Return the next assignment whose scene is of a split."""
     for _ in range(MAX_SAMPLES):
         sampled = task.sample(robot, generator)

@@ -23,7 +23,7 @@ from ccr_gym.scales import FORCE_SCALE_N
 from ccr_gym.settings import RobotT
 from solver import Circle, HalfPlane, Robot, Scene
 from solver.common.scene import MAX_OBSTACLES
-from solver.common.validation import SMALLEST, whole
+from solver.common.validation import SMALLEST, check_whole
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
 Range = tuple[float, float]
@@ -169,7 +169,7 @@ class TrackForce(PushObstacle):
     moving: ClassVar[bool] = True
     steps: ClassVar[int] = PROFILE_STEPS
 
-    jumps: int = checked(3, whole, low=0, high=PROFILE_STEPS)
+    jumps: int = checked(3, check_whole, low=0, high=PROFILE_STEPS)
     swing: Range = checked((0.1, 0.4), check_range, low=0, below=1)
     period: Range = checked((24.0, 64.0), check_range, low=1)
 
@@ -326,10 +326,10 @@ def check_task(task: object) -> None:
     """
     check_type("task", task, Task)
     assert isinstance(task, Task)
-    whole("obstacles of the task", task.obstacles, 1, MAX_OBSTACLES)
-    whole("steps of the task", task.steps, 1, MAX_STEPS)
+    check_whole("obstacles of the task", task.obstacles, 1, MAX_OBSTACLES)
+    check_whole("steps of the task", task.steps, 1, MAX_STEPS)
     if task.target is not None:
-        whole("target of the task", task.target, 0, task.obstacles - 1)
+        check_whole("target of the task", task.target, 0, task.obstacles - 1)
 
 
 def _smallest_circle(x_mm: Range, y_mm: Range, radius_mm: Range) -> Circle:

@@ -16,7 +16,7 @@ from ccr_gym.episodes import EpisodeBatch, PrivilegedState
 from ccr_gym.quantities import Quantity
 from ccr_gym.reward import TERMS
 from ccr_gym.tasks import MAX_STEPS, TASKS, AnyTask, make_task
-from solver.common.validation import is_listed, sequence, shown, whole
+from solver.common.validation import check_sequence, check_whole, is_listed, shown
 
 MAX_ENVS = 65_536
 THREADS_PER_CORE = 4
@@ -55,11 +55,11 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     ) -> None:
         require(render_mode is None, f"render_mode is {shown(render_mode)}; use vectorization_mode='sync' to render")
         self.task, self.settings = task, make_settings(type(self).__name__, task, settings, ARGUMENTS)
-        self.num_envs = num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
-        most, reason = THREADS_PER_CORE * (os.cpu_count() or 1), f" ({THREADS_PER_CORE} for each core of this machine)"
-        threads = whole("threads", threads, 1, most, reason)
+        self.num_envs = num_envs = check_whole("num_envs", num_envs, 1, MAX_ENVS)
+        most, reason = THREADS_PER_CORE * (os.cpu_count() or 1), f"{THREADS_PER_CORE} for each core of this machine"
+        threads = check_whole("threads", threads, 1, most, reason)
         steps = task.steps if max_episode_steps is None else max_episode_steps
-        self.max_episode_steps = whole("max_episode_steps", steps, 1, MAX_STEPS)
+        self.max_episode_steps = check_whole("max_episode_steps", steps, 1, MAX_STEPS)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
         self._episodes = EpisodeBatch(task, self.settings, num_envs, threads)
@@ -161,7 +161,7 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     def _seeds(self, seed: object) -> list[int | None]:
         """Return one seed for each environment, None to keep its generator."""
         if is_listed(seed):
-            seeds = sequence("seed", seed, "one for each environment")
+            seeds = check_sequence("seed", seed, "one for each environment")
             require(len(seeds) == self.num_envs, f"seed has {len(seeds)} entries; it must have {self.num_envs}")
             return [check_seed(f"seed[{i}]", entry) for i, entry in enumerate(seeds)]
         first = check_seed("seed", seed)

@@ -153,7 +153,7 @@ def test_none_and_empty_mappings_mean_the_defaults(env_id, given):
         ({"count": "3"}, "num_envs is '3'"),
         ({"count": True}, "num_envs is True"),
         ({"count": 10**9}, "num_envs is 1000000000"),
-        ({"threads": 100_000}, r"threads is 100000; it must be .* \(4 for each core of this machine\)"),
+        ({"threads": 100_000}, r"threads is 100000; it must be .* 4 for each core of this machine"),
         ({"threads": 0}, "threads is 0"),
         ({"threads": -1}, "threads is -1"),
         ({"threads": 1.5}, "threads is 1.5"),
