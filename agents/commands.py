@@ -25,8 +25,8 @@ Command = (
 
 def train(config: TrainConfig) -> None:
     """Train a policy on an environment, or go on with a run that was interrupted."""
-    from agents.training import is_finished
-    from agents.training import train as run
+    from agents.learning.training import is_finished
+    from agents.learning.training import train as run
 
     if is_finished(config):
         print(f"{config.run} is finished already; --restart trains it anew")
@@ -39,7 +39,7 @@ def evaluate(config: EvaluateConfig) -> None:
     """Evaluate policies on test scenes they were never trained or tuned on."""
     from rich.progress import track
 
-    from agents import report, suite
+    from agents.benchmark import report, suite
 
     played = suite.entries(config)
     (config.out / "videos").mkdir(parents=True, exist_ok=True)
@@ -52,14 +52,14 @@ def evaluate(config: EvaluateConfig) -> None:
 
 def retrain(config: RetrainConfig) -> None:
     """Train every learned baseline on every environment, as the shipped policies were."""
-    from agents.retrain import retrain as run
+    from agents.learning.retrain import retrain as run
 
     run(config)
 
 
 def sweep(config: SweepConfig) -> None:
     """Search settings of a controller or a learner on training scenes, with Optuna."""
-    from agents.sweep import sweep as run
+    from agents.benchmark.sweep import sweep as run
 
     study = run(config)
     print(f"Best of {len(study.trials)}: {study.best_value:.3f} mN with {study.best_params}")
@@ -74,7 +74,7 @@ def bench(config: BenchConfig) -> None:
 
 def reproduce(config: ReproduceConfig) -> None:
     """Regenerate the paper's figures and table, and check its claims in numbers."""
-    from agents.reproduce import reproduce as run
+    from agents.paper.reproduce import reproduce as run
 
     for claim in run(config.out):
         print(f"{'holds' if claim.holds else 'DOES NOT HOLD'}: {claim.sentence}\n    {claim.found}")

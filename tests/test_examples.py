@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from agents.sb3_adapter import SB3VecEnv
+from agents.learning.sb3_adapter import SB3VecEnv
 from agents.tuned import PPO_IDEAL
 from ccr_gym import ENV_IDS
 

@@ -13,12 +13,12 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from agents.actor import LearnedPolicy
+from agents.benchmark.evaluate import run_episodes
 from agents.config import EVALUATION_SEED, TrainConfig
-from agents.evaluate import run_episodes
-from agents.learners import learner, scaled
-from agents.sb3_adapter import SB3VecEnv
-from agents.training import train
+from agents.learning.actor import LearnedPolicy
+from agents.learning.learners import learner, scaled
+from agents.learning.sb3_adapter import SB3VecEnv
+from agents.learning.training import train
 from agents.tuned import PPO_IDEAL
 
 OURS, PEER = "CCR/PushObstacle-v0", "Pendulum-v1"

@@ -11,11 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from agents import checkpoint, cli, commands, training
-from agents.actor import ACTOR, LearnedPolicy
+from agents import cli, commands
 from agents.config import TrainConfig
 from agents.errors import UserError
 from agents.files import LOCK, PARTIAL, locked, replacing, write_text
+from agents.learning import checkpoint, training
+from agents.learning.actor import ACTOR, LearnedPolicy
 from agents.tuned import PPOSettings
 from agents.workers import workers
 
