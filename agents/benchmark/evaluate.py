@@ -1,19 +1,18 @@
-"""Episodes of policies on unseen scenes, and what is measured of them."""
+"""Episodes of policies, and metrics of them."""
 
 import time
 from dataclasses import dataclass, fields
-from typing import Any
 
-import gymnasium
 import numpy as np
 
-import ccr_gym  # noqa: F401 - registers the ids
+from agents.environment import make_env
 from agents.policy import Policy
-from solver import Status
+from solver import Equilibrium, Status
+from solver.spatial import SpatialEquilibrium
 
-TOLERANCE = 0.05  # relative force error that counts as reached
-SEARCH = 24  # steps in which contact is found, which do not count
-STEADY = 16  # last steps, of the steady-state error
+TOLERANCE = 0.05  # relative force error that counts as success
+SEARCH = 24  # first steps, in which contact is found; their errors do not count
+STEADY = 16  # last steps, for the steady-state error
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,44 +20,44 @@ class Episode:
     """One episode, step by step.
 
     Attributes:
-        goal: Magnitude of the set-point that holds after every step, ``(k,)`` [N].
-        lacking: How far the force is from the set-point after every step, of magnitudes or vectors, ``(k,)`` [N].
-        misread: The same of the virtual-work estimate, ``(k,)`` [N].
-        true: True contact force magnitude after every step, ``(k,)`` [N].
-        estimated: Virtual-work estimate of it, ``(k,)`` [N].
-        cost: Force above the limit after every step, ``(k,)`` [N].
+        goal: Magnitude of the set-point after every step, ``(k,)`` [N].
+        error_n: Distance of the true force from the set-point, of magnitudes or vectors, ``(k,)`` [N].
+        estimate_error_n: Distance of the virtual-work estimate from the set-point, ``(k,)`` [N].
+        true: Magnitude of the true contact force, ``(k,)`` [N].
+        estimated: Magnitude of its virtual-work estimate, ``(k,)`` [N].
+        cost: Force above the limit, ``(k,)`` [N].
         statuses: Solver status of every step.
-        equilibria: Equilibrium after every step, if they were to be kept.
-        seconds: Time the policy took for its decisions [s].
+        equilibria: Equilibrium after every step, if they were asked for.
+        seconds: Time that the policy took to act [s].
     """
 
     goal: np.ndarray
-    lacking: np.ndarray
-    misread: np.ndarray
+    error_n: np.ndarray
+    estimate_error_n: np.ndarray
     true: np.ndarray
     estimated: np.ndarray
     cost: np.ndarray
     statuses: tuple[Status, ...]
-    equilibria: tuple[Any, ...]
+    equilibria: tuple[Equilibrium | SpatialEquilibrium, ...]
     seconds: float
 
     @property
     def error(self) -> np.ndarray:
         """Relative force error after every step, ``(k,)``."""
-        return np.asarray(self.lacking / self.goal)
+        return np.asarray(self.error_n / self.goal)
 
 
 @dataclass(frozen=True, slots=True)
 class Metrics:
-    """What one episode comes to.
+    """Metrics of one episode.
 
     Attributes:
-        rmse_mn: Root mean square force error after the steps of the search [mN]; what policies are ranked by.
-        estimate_rmse_mn: The same of the virtual-work estimate [mN].
+        rmse_mn: Root mean square force error after the steps of the search [mN]; policies are ranked by it.
+        estimate_rmse_mn: The same for the virtual-work estimate [mN].
         steady_mn: Mean force error of the last steps [mN].
-        success: Whether the episode ends within 5 % of the set-point.
-        settling_step: Step after which the error stays within 5 %; beyond the last one if it does not.
-        overshoot: Largest force above the set-point, relative to it.
+        success: 1 if the episode ends within 5 % of the set-point, else 0.
+        settling_step: Step from which the error stays within 5 %; one beyond the last if it does not.
+        overshoot: Largest force above the set-point, relative to the set-point.
         contact_losses: How often contact is lost.
         peak_mn: Largest force [mN].
         violations: Steps with a force above the limit.
@@ -81,12 +80,12 @@ METRICS = tuple(field.name for field in fields(Metrics))
 
 
 def measure(episode: Episode) -> Metrics:
-    """The metrics of an episode."""
+    """Return the metrics of an episode."""
     touching, outside = episode.true > 0, np.flatnonzero(episode.error > TOLERANCE)
     return Metrics(
-        rmse_mn=_rms_mn(episode.lacking[SEARCH:]),
-        estimate_rmse_mn=_rms_mn(episode.misread[SEARCH:]),
-        steady_mn=1e3 * float(episode.lacking[-STEADY:].mean()),
+        rmse_mn=_rms_mn(episode.error_n[SEARCH:]),
+        estimate_rmse_mn=_rms_mn(episode.estimate_error_n[SEARCH:]),
+        steady_mn=1e3 * float(episode.error_n[-STEADY:].mean()),
         success=float(episode.error[-1] <= TOLERANCE),
         settling_step=float(outside[-1] + 2 if outside.size else 1),
         overshoot=max(0.0, float((episode.true / episode.goal).max()) - 1),
@@ -97,42 +96,62 @@ def measure(episode: Episode) -> Metrics:
     )
 
 
-def run_episode(policy: Policy, env_id: str, seed: int, keep: bool = False, **kwargs: Any) -> Episode:
-    """Play one episode of an environment made with some arguments; equilibria are kept if asked for."""
-    env = gymnasium.make(env_id, obs_mode="dict", disable_env_checker=True, **kwargs)
+def run_episode(policy: Policy, env_id: str, seed: int, keep: bool = False, **kwargs: object) -> Episode:
+    """Play one episode of an environment.
+
+    Args:
+        policy: The policy.
+        env_id: Id of the environment.
+        seed: Seed of the episode.
+        keep: Whether to keep the equilibria.
+        **kwargs: Arguments of the environment, such as ``sensing`` and ``split``.
+    """
+    env = make_env(env_id, **kwargs)
     observation, info = env.reset(seed=seed)
     policy.reset(env)
-    told: list[tuple[Any, ...]] = []
+    rows: list[tuple[float, ...]] = []
     statuses, equilibria, seconds, truncated = [], [], 0.0, False
     while not truncated:
         start = time.perf_counter()
         action = policy.act(observation)
         seconds += time.perf_counter() - start
         observation, _, _, truncated, info = env.step(action)
-        goal, true, estimated = info["desired_force"], info["force_true"], info["force_est"]
-        size, reading = np.linalg.norm(true), np.linalg.norm(estimated)
-        if np.ndim(goal) == 0:
-            away = abs(size - goal), abs(reading - goal)
-        else:
-            away = np.linalg.norm(true - goal), np.linalg.norm(estimated - goal)
-        told.append((np.linalg.norm(goal), *away, size, reading, info["cost"]))
+        rows.append(_forces(info["desired_force"], info["force_true"], info["force_est"], info["cost"]))
         statuses.append(Status(info["solver_status"]))
         if keep:
             equilibria.append(env.get_wrapper_attr("equilibrium"))
     env.close()
-    goal, lacking, misread, true, estimated, cost = np.array(told, float).T
-    played = tuple(statuses), tuple(equilibria), seconds
-    return Episode(goal, lacking, misread, true, estimated, cost, *played)
+    goal, error, estimate_error, true, estimated, cost = np.array(rows, float).T
+    outcome = tuple(statuses), tuple(equilibria), seconds
+    return Episode(goal, error, estimate_error, true, estimated, cost, *outcome)
 
 
-def run_episodes(policy: Policy, env_id: str, seed: int, count: int, **kwargs: Any) -> list[Episode]:
-    """Play episodes of consecutive seeds."""
-    return [run_episode(policy, env_id, seed + i, **kwargs) for i in range(count)]
+def _forces(goal: np.ndarray | float, true: np.ndarray, estimated: np.ndarray, cost: float) -> tuple[float, ...]:
+    """Return the numbers of a step in the order of :class:`Episode`."""
+    size, estimate = float(np.linalg.norm(true)), float(np.linalg.norm(estimated))
+    if np.ndim(goal) == 0:
+        errors = abs(size - float(goal)), abs(estimate - float(goal))
+    else:
+        errors = float(np.linalg.norm(true - goal)), float(np.linalg.norm(estimated - goal))
+    return float(np.linalg.norm(goal)), *errors, size, estimate, cost
 
 
-def scores(policy: Policy, env_id: str, seed: int, count: int, **kwargs: Any) -> np.ndarray:
-    """Root mean square force error of episodes of consecutive seeds, ``(count,)`` [mN]."""
-    return np.array([measure(e).rmse_mn for e in run_episodes(policy, env_id, seed, count, **kwargs)])
+def run_episodes(policy: Policy, env_id: str, seed: int, count: int, **kwargs: object) -> list[Episode]:
+    """Play episodes with consecutive seeds."""
+    return [run_episode(policy, env_id, seed + i, False, **kwargs) for i in range(count)]
+
+
+def scores(policy: Policy, env_id: str, seed: int, count: int, **kwargs: object) -> np.ndarray:
+    """Return the root mean square force errors of episodes with consecutive seeds, ``(count,)`` [mN].
+
+    Args:
+        policy: The policy.
+        env_id: Id of the environment.
+        seed: Seed of the first episode.
+        count: Number of episodes.
+        **kwargs: Arguments of the environment, such as ``sensing`` and ``split``.
+    """
+    return np.array([measure(episode).rmse_mn for episode in run_episodes(policy, env_id, seed, count, **kwargs)])
 
 
 def _rms_mn(forces: np.ndarray) -> float:

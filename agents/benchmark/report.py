@@ -1,8 +1,7 @@
-"""Results of the benchmark as JSON, tables and figures."""
+"""Results of the benchmark as JSON, tables, figures and model cards."""
 
 import json
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -10,14 +9,16 @@ from rich.table import Table
 
 from agents.benchmark.cards import card
 from agents.benchmark.figures import draw_curves, draw_episodes, draw_profiles, draw_scores
-from agents.benchmark.suite import Result, folder_name
+from agents.benchmark.suite import Result
 from agents.config import EvaluateConfig
-from agents.files import write_text
+from agents.files import JsonObject, write_text
+from agents.learning.actor import LearningCurve
+from agents.learning.pretrained import folder_name
 
 NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
 WIDTH = 190  # of a printed table
-BOUND, RIVAL = "Oracle", "PI"
-COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {  # heading of a column, and its text from a summary
+BOUND, BASELINE = "Oracle", "PI"
+COLUMNS: dict[str, Callable[[JsonObject], str]] = {  # heading of a column, and its text from a summary
     "force error [mN]": lambda s: "{:.2f} [{:.2f}, {:.2f}]".format(s["rmse_iqm_mn"], *s["rmse_interval_mn"]),
     "first seed": lambda s: f"{s['rmse_of_seeds_mn'][0]:.2f}" if len(s["rmse_of_seeds_mn"]) > 1 else "",
     "worst tenth": lambda s: f"{s['rmse_cvar_mn']:.1f}",
@@ -33,77 +34,87 @@ COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {  # heading of a column, 
     "decisions/s": lambda s: f"{s['decisions_per_second']:.0f}",
     "training": lambda s: f"{s['training_seconds']:.0f} s" if s["training_seconds"] else "",
 }
+HEADINGS = ("policy", "closed", *COLUMNS)
+Grouped = dict[str, list[Result]]  # results by environment
 
 
 def write(results: list[Result], config: EvaluateConfig) -> None:
-    """Write everything into the folder of an evaluation, and print the tables."""
-    told = {"episodes": config.episodes, "seed": config.seed, "split": "test"}
-    report = told | {"results": [result.as_dict() for result in results]}
-    write_text(config.out / "evaluation.json", json.dumps(report) + "\n")
+    """Write results, tables, figures and model cards into the folder of an evaluation, and print the tables."""
+    report = {"episodes": config.episodes, "seed": config.seed, "split": "test"}
+    values = report | {"results": [result.as_dict() for result in results]}
+    write_text(config.out / "evaluation.json", json.dumps(values) + "\n")
     first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
     write_text(config.out / "scores.json", json.dumps(first) + "\n")
     by_id = group(results)
     write_text(config.out / "evaluation.md", f"{matrix(by_id)}\n{markdown(by_id)}")
-    for result in results:
-        if result.trainings:
-            folder = config.out / "cards" / result.entry.policy / folder_name(result.entry.env_id)
-            folder.mkdir(parents=True, exist_ok=True)
-            write_text(folder / "README.md", card(result, by_id[result.entry.env_id], config))
-    for env_id, here in by_id.items():
-        draw_episodes({r.entry.policy: r.shown for r in here}, config.out / f"{folder_name(env_id)}.png")
-    draw_scores({env_id: {r.entry.policy: r.summary for r in here} for env_id, here in by_id.items()}, config.out)
-    draw_profiles(
-        {env_id: {r.entry.policy: r.rmse.ravel() for r in here} for env_id, here in by_id.items()}, config.out
-    )
-    if any(result.trainings for result in results):
-        draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
+    _write_cards(by_id, config)
+    _draw(by_id, config)
     show(by_id)
 
 
-def group(results: list[Result]) -> dict[str, list[Result]]:
-    """Results by environment, in the order in which they are given."""
-    by_id: dict[str, list[Result]] = {}
+def _write_cards(by_id: Grouped, config: EvaluateConfig) -> None:
+    for env_id, here in by_id.items():
+        for result in here:
+            if result.trainings:
+                folder = config.out / "cards" / result.entry.policy / folder_name(env_id)
+                folder.mkdir(parents=True, exist_ok=True)
+                write_text(folder / "README.md", card(result, here, config))
+
+
+def _draw(by_id: Grouped, config: EvaluateConfig) -> None:
+    for env_id, here in by_id.items():
+        draw_episodes({r.entry.policy: r.shown for r in here}, config.out / f"{folder_name(env_id)}.png")
+    draw_scores({env_id: {r.entry.policy: r.summary for r in here} for env_id, here in by_id.items()}, config.out)
+    errors = {env_id: {r.entry.policy: r.rmse.ravel() for r in here} for env_id, here in by_id.items()}
+    draw_profiles(errors, config.out)
+    if any(result.trainings for here in by_id.values() for result in here):
+        draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
+
+
+def group(results: list[Result]) -> Grouped:
+    """Return results by environment, in the given order."""
+    by_id: Grouped = {}
     for result in results:
         by_id.setdefault(result.entry.env_id, []).append(result)
     return by_id
 
 
 def closed(result: Result, rivals: list[Result]) -> float | None:
-    """Share of the distance from the PI controller's force error to the bound's that a policy closes."""
+    """Return the share of the gap between the force errors of the baseline and the bound that a policy closes."""
     errors = {r.entry.policy: float(r.summary["rmse_iqm_mn"]) for r in rivals}
-    if BOUND not in errors or RIVAL not in errors:
+    if BOUND not in errors or BASELINE not in errors:
         return None
-    return (errors[RIVAL] - float(result.summary["rmse_iqm_mn"])) / (errors[RIVAL] - errors[BOUND])
+    return (errors[BASELINE] - float(result.summary["rmse_iqm_mn"])) / (errors[BASELINE] - errors[BOUND])
 
 
-def apart(result: Result, rivals: list[Result]) -> bool:
-    """Whether a policy's interval lies below that of the PI controller."""
-    others = [r.summary["rmse_interval_mn"] for r in rivals if r.entry.policy == RIVAL]
+def is_below(result: Result, rivals: list[Result]) -> bool:
+    """Return whether a policy's interval lies below that of the baseline."""
+    others = [r.summary["rmse_interval_mn"] for r in rivals if r.entry.policy == BASELINE]
     return bool(others) and result.summary["rmse_interval_mn"][1] < others[0][0]
 
 
 def cells(result: Result, rivals: list[Result]) -> list[str]:
-    """A row of the table."""
+    """Return a row of the table."""
     summary, share = result.summary, closed(result, rivals)
-    gain = "" if share is None else f"{share:.0%}" + (" *" if apart(result, rivals) else "")
+    gain = "" if share is None else f"{share:.0%}" + (" *" if is_below(result, rivals) else "")
     return [result.entry.policy, gain, *(text(summary) for text in COLUMNS.values())]
 
 
-def markdown(by_id: dict[str, list[Result]]) -> str:
-    """A table for every environment."""
+def markdown(by_id: Grouped) -> str:
+    """Return a table for every environment, in Markdown."""
     lines: list[str] = []
     for env_id, here in by_id.items():
-        headings = ["policy", "closed", *COLUMNS]
-        lines += [f"### {env_id}", "", "| " + " | ".join(headings) + " |", "| --- " * len(headings) + "|"]
+        lines += [f"### {env_id}", "", "| " + " | ".join(HEADINGS) + " |", "| --- " * len(HEADINGS) + "|"]
         lines += ["| " + " | ".join(cells(result, here)) + " |" for result in here]
         lines.append("")
     return "\n".join(lines)
 
 
-def matrix(by_id: dict[str, list[Result]]) -> str:
-    """The force errors of all policies on all environments, in one table; bold where a policy wins.
+def matrix(by_id: Grouped) -> str:
+    """Return the force errors of all policies on all environments as one table in Markdown, winners in bold.
 
-    It wins where it closes half of the distance from the PI controller to the bound, with disjoint intervals.
+    A policy wins if it closes at least half of the gap between baseline and bound, and its interval lies below that of
+    the baseline.
     """
     names = list(dict.fromkeys(result.entry.policy for here in by_id.values() for result in here))
     lines = ["| id | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
@@ -119,21 +130,21 @@ def _cell(result: Result | None, rivals: list[Result]) -> str:
     summary = result.summary
     low, high = summary["rmse_interval_mn"]
     text = f"{summary['rmse_iqm_mn']:.2f} [{low:.2f}, {high:.2f}]"
-    wins = (closed(result, rivals) or 0) >= 0.5 and apart(result, rivals) and result.entry.policy != BOUND
+    wins = (closed(result, rivals) or 0) >= 0.5 and is_below(result, rivals) and result.entry.policy != BOUND
     return f"**{text}**" if wins else text
 
 
-def show(by_id: dict[str, list[Result]]) -> None:
+def show(by_id: Grouped) -> None:
     """Print the tables."""
     console = Console(width=max(WIDTH, Console().width))
     for env_id, here in by_id.items():
         table = Table(title=f"{env_id}, {here[0].entry.sensing} sensing")
-        for heading in ("policy", "closed", *COLUMNS):
+        for heading in HEADINGS:
             table.add_column(heading, justify="left" if heading == "policy" else "right", no_wrap=heading in NARROW)
         for result in here:
             table.add_row(*cells(result, here))
         console.print(table)
 
 
-def _curves(results: list[Result]) -> dict[str, list[Any]]:
+def _curves(results: list[Result]) -> dict[str, list[LearningCurve]]:
     return {r.entry.policy: [training.curve for training in r.trainings] for r in results if r.trainings}

@@ -9,27 +9,27 @@ QUARTER = 0.25
 
 
 def iqm(samples: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Interquartile mean: that of the middle half."""
+    """Return the interquartile mean: the mean of the middle half of the samples."""
     return np.asarray(stats.trim_mean(samples, QUARTER, axis=axis))
 
 
 def iqm_interval(samples: np.ndarray, seed: int = 0) -> tuple[float, float]:
-    """95 % interval of the interquartile mean of all samples, from a percentile bootstrap.
+    """Return the 95 % interval of the interquartile mean of all samples, from a percentile bootstrap.
 
-    All training seeds play the same scenes: both are drawn anew, the seeds as rows and the scenes as columns.
+    As all training seeds play the same scenes, seeds (rows) and scenes (columns) are resampled independently.
 
     Args:
-        samples: Of every training seed and scene, ``(seeds, scenes)``.
-        seed: Of the resampling.
+        samples: Samples of every training seed and scene, ``(seeds, scenes)``.
+        seed: Seed of the resampling.
     """
 
-    def drawn(rows: np.ndarray, columns: np.ndarray, axis: int) -> np.ndarray:
+    def resampled_iqm(rows: np.ndarray, columns: np.ndarray, axis: int) -> np.ndarray:
         crossed = samples[rows[..., :, None], columns[..., None, :]]
         return iqm(crossed.reshape(*crossed.shape[:-2], -1), axis)
 
     found = stats.bootstrap(
-        [np.arange(max(count, 2)) % count for count in samples.shape],  # SciPy asks for two of each
-        drawn,
+        [np.arange(max(count, 2)) % count for count in samples.shape],  # SciPy needs at least two of each
+        resampled_iqm,
         n_resamples=RESAMPLES,
         method="percentile",
         vectorized=True,
@@ -39,11 +39,11 @@ def iqm_interval(samples: np.ndarray, seed: int = 0) -> tuple[float, float]:
 
 
 def cvar(samples: np.ndarray) -> float:
-    """Mean of the largest tenth: the conditional value at risk at 90 %."""
+    """Return the mean of the largest tenth: the conditional value at risk at 90 %."""
     worst = np.sort(samples)[-max(round(TAIL * len(samples)), 1) :]
     return float(worst.mean())
 
 
 def profile(samples: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Share of samples at or below each level: the performance profile of what is to be small."""
+    """Return the performance profile: the share of samples at or below each level."""
     return np.asarray((samples[:, None] <= levels).mean(axis=0))

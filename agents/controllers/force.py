@@ -1,11 +1,12 @@
 """Proportional and proportional-integral control of the contact force."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from agents.policy import Observation, Tare, search
+from agents.controllers.tare import Tare
+from agents.environment import Environment
+from agents.policy import Observation, search
 from agents.tuned import P_GAINS, PI_GAINS
 from ccr_gym import FORCE_SCALE_N
 
@@ -14,13 +15,14 @@ from ccr_gym import FORCE_SCALE_N
 class ForceController:
     """Proportional-integral control of the contact force's magnitude, after a search for contact at full speed.
 
-    What the sensor reads while nothing touches is taken off from then on. The cable increment is the change of the
-    controller's output (velocity form), so saturation winds nothing up. In space both cables move along the way of the
-    search; an insertion is left as it is.
+    The mean sensor reading before contact is subtracted. The action is the change of the controller's output (velocity
+    form), so the integral does not wind up at saturation. In space both cables move in the direction of the search; an
+    insertion stays where it is.
 
     Attributes:
-        proportional: Action per newton of change of the force error.
+        proportional: Action per newton of change in the force error.
         integral: Action per newton of force error.
+        name: Name of the policy.
     """
 
     proportional: float = 5.0
@@ -31,21 +33,21 @@ class ForceController:
 
     @classmethod
     def tuned(cls, env_id: str) -> "ForceController":
-        """With the gains of least force error on training scenes with realistic sensing."""
+        """Return the controller with the gains that were best on training scenes with realistic sensing."""
         return cls(*PI_GAINS[env_id])
 
     @classmethod
     def proportional_only(cls, env_id: str) -> "ForceController":
-        """The same with increments in proportion to the force error, and to nothing else."""
+        """Return the tuned controller whose action is proportional to the force error."""
         return cls(0.0, P_GAINS[env_id], "P")
 
-    def reset(self, env: Any = None) -> None:
-        """Forget the last error, and what the sensor read."""
+    def reset(self, env: Environment | None = None) -> None:
+        """Forget the last error and the zero of the sensor."""
         self._last = None
-        self._tare.forget()
+        self._tare.reset()
 
     def act(self, observation: Observation) -> np.ndarray:
-        """Pull until something touches, then control the force."""
+        """Return the search action until something touches, then control the force."""
         force = self._tare.force(observation)
         if force is None:
             self._last = None

@@ -1,111 +1,123 @@
-"""A controller on the exact model, and the oracle: the bound for all that do not know what is hidden."""
+"""Newton steps on the exact model, and the oracle: an upper bound that sees every hidden quantity."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from agents.controllers.lag import Lag, seen_cables
-from agents.policy import Observation, Tare, effort, search, set_points
+from agents.controllers.lag import LagEstimator, observed_cables
+from agents.controllers.tare import Tare
+from agents.environment import Actuation, Environment, require_env
+from agents.policy import Observation, motor_actions, search, set_points
 from agents.tuned import NEWTON_GAIN
 from ccr_gym import FORCE_SCALE_N, PrivilegedState
 from solver import Equilibrium, Sensitivity, sensitivity
 from solver.spatial import SpatialSensitivity, spatial_sensitivity
 
-PROBE_MM = 1e-3  # move of a trial
+PROBE_MM = 1e-3  # trial move of a finite difference
 PRIOR = np.full(2, 1e-6)  # a reading of 1 mN that agrees with the model [N²]
 
 
 @dataclass(slots=True)
 class NewtonController:
-    """Newton steps on the exact slopes of the contact force in what the actions move, at the equilibrium itself.
+    """Newton steps on the exact slopes of the contact force in the actuated displacements, at the present equilibrium.
 
-    It knows the model, the scene and the state of the robot, which no policy sees, but for the rigidity: that is the
-    ratio of what the sensor reads to what the model felt a latency ago. The zero of the sensor is taken from before
-    contact, latency and play from where the cables are seen to be (:class:`Lag`). The oracle is told all of it, the
-    true force and the next set-point: a bound for those that are not. Where there are two actions the smallest
-    increments are taken that meet the set-point, or come closest to one that is a vector.
+    It knows the model, the scene and the state of the robot, which policies do not see, but not the rigidity: that it
+    estimates as the ratio of the sensor readings to the model's forces one latency earlier. The zero of the sensor
+    comes from the time before contact; latency and backlash come from the observed cables (:class:`LagEstimator`). The
+    oracle sees all of these, the true force and the next set-point: it is an upper bound, not a competitor. With two
+    actions the increments are the smallest that reach the set-point, or come closest to a set-point that is a vector.
 
     Attributes:
-        oracle: Whether it knows what is hidden.
-        gain: Part of a Newton step that is made.
+        oracle: Whether it sees every hidden quantity.
+        gain: Share of a Newton step that is made.
         damping: Slope of the force below which it is not trusted [N/mm].
-        name: Of the policy.
+        name: Name of the policy.
     """
 
     oracle: bool = False
     gain: float = NEWTON_GAIN
     damping: float = 1e-4
     name: str = "Newton"
-    _env: Any = field(default=None, init=False)
+    _env: Environment = field(init=False)
+    _actuation: Actuation = field(init=False)
     _tare: Tare = field(default_factory=Tare, init=False)
-    _lag: Lag = field(default_factory=lambda: Lag(1, 1), init=False)
-    _felt: list[float] = field(default_factory=list, init=False)
+    _lag: LagEstimator = field(default_factory=lambda: LagEstimator(1, 1), init=False)
+    _modelled: list[float] = field(default_factory=list, init=False)
     _fit: np.ndarray = field(default_factory=PRIOR.copy, init=False)
 
     @classmethod
     def knowing(cls) -> "NewtonController":
-        """The oracle."""
+        """Return the oracle."""
         return cls(oracle=True, gain=1.0, name="Oracle")
 
-    def reset(self, env: Any = None) -> None:
-        """Take the environment whose equilibrium is known."""
-        self._env, self._fit = env, PRIOR.copy()
-        self._lag = Lag(1, env.get_wrapper_attr("task").body.model.cables)
-        self._tare.forget()
-        self._felt.clear()
+    def reset(self, env: Environment | None = None) -> None:
+        """Forget the episode and take the environment whose equilibrium is known.
+
+        Raises:
+            ValueError: If there is no environment.
+        """
+        self._env, self._fit = require_env(env), PRIOR.copy()
+        self._actuation = Actuation.of(self._env.get_wrapper_attr("task"), self._env.get_wrapper_attr("settings"))
+        self._lag = LagEstimator(1, self._actuation.cables)
+        self._tare.reset()
+        self._modelled.clear()
 
     def act(self, observation: Observation) -> np.ndarray:
-        """Pull until something touches, then step to where the force is that of the set-point."""
-        truth: PrivilegedState = self._env.get_wrapper_attr("privileged_state")
-        task, settings = self._env.get_wrapper_attr("task"), self._env.get_wrapper_attr("settings")
+        """Return the search action until something touches, then a step to the force of the set-point."""
+        state: PrivilegedState = self._env.get_wrapper_attr("privileged_state")
         if not self.oracle:
-            truth = self._seen(observation, truth, settings)
-        if not truth.force.any():
+            state = self._estimated(observation, state)
+        if not state.force.any():
             return search(observation)
-        slopes = self._tried(truth) if self.oracle else self._slopes(truth, task.target, "length" in observation)
-        if np.ndim(truth.goal) == 0:  # along the force as it is
-            size = float(np.linalg.norm(truth.force))
-            slopes, lacking = slopes @ (truth.force / size)[:, None], np.array([truth.goal - size])
+        slopes = self._tried(state) if self.oracle else self._slopes(state, "length" in observation)
+        if np.ndim(state.goal) == 0:  # a magnitude: only the component along the present force counts
+            size = float(np.linalg.norm(state.force))
+            slopes, missing = slopes @ (state.force / size)[:, None], np.array([state.goal - size])
         else:
-            lacking = truth.goal - truth.force
-        (low, high), free = task.body.bounds(settings), np.ones(len(slopes), bool)
-        for _ in free:  # a motor at its bound leaves the rest to the other
-            damped = slopes @ slopes.T + (truth.rigidity_ratio * self.damping) ** 2 * np.eye(len(slopes))
-            increments = np.linalg.solve(damped, slopes @ lacking)
-            free &= np.where(increments > 0, truth.motors < high, truth.motors > low)
-            slopes = slopes * free[:, None]
-        return effort(self.gain * increments, truth, task.body.increments(settings))
+            missing = state.goal - state.force
+        return motor_actions(self.gain * self._step(slopes, missing, state), state, self._actuation.increments)
 
-    def _seen(self, observation: Observation, truth: PrivilegedState, settings: Any) -> PrivilegedState:
-        """What it takes for the truth if it does not know what is hidden."""
-        force, cables = truth.force / truth.rigidity_ratio, observation["cable"].size  # the force of the model
+    def _step(self, slopes: np.ndarray, missing: np.ndarray, state: PrivilegedState) -> np.ndarray:
+        """Return the damped least-squares increments, ``(actions,)`` [mm], that add the missing force.
+
+        A motor at the end of its range is taken out, and the remaining ones make up for it.
+        """
+        free, damping = np.ones(len(slopes), bool), (state.rigidity_ratio * self.damping) ** 2
+        for _ in free:
+            increments = np.linalg.solve(slopes @ slopes.T + damping * np.eye(len(slopes)), slopes @ missing)
+            free &= np.where(increments > 0, state.motors < self._actuation.high, state.motors > self._actuation.low)
+            slopes = slopes * free[:, None]
+        return np.asarray(increments)
+
+    def _estimated(self, observation: Observation, state: PrivilegedState) -> PrivilegedState:
+        """Return the state with every hidden quantity replaced by its estimate."""
+        force, cables = state.force / state.rigidity_ratio, observation["cable"].size  # the force of the nominal model
         vector = FORCE_SCALE_N * observation["desired_force"].astype(float)
-        goal: Any = vector if vector.size > 1 else set_points(observation, 1).item()
-        self._lag.see(truth.motors[None, :cables], seen_cables(observation, settings.robot)[None])
-        self._felt.append(float(np.linalg.norm(force)))
+        goal = vector if vector.size > 1 else set_points(observation, 1).item()
+        observed = observed_cables(observation, self._env.get_wrapper_attr("settings").robot)
+        self._lag.update(state.motors[None, :cables], observed[None])
+        self._modelled.append(float(np.linalg.norm(force)))
         measured = self._tare.force(observation)
         if measured is not None:
-            then = self._felt[max(-1 - self._lag.latency.item(), -len(self._felt))]
+            then = self._modelled[max(-1 - self._lag.latency.item(), -len(self._modelled))]
             self._fit = self._fit + then * np.array([np.linalg.norm(measured), then])
         ratio = self._fit[0] / self._fit[1]
-        slack = np.where(np.arange(truth.slack.size) < cables, self._lag.slack, 0.0)  # an insertion has none
-        return PrivilegedState(ratio * force, ratio, goal, truth.places, truth.motors, slack)
+        slack = np.where(np.arange(state.slack.size) < cables, self._lag.half_backlash, 0.0)  # an insertion has none
+        return PrivilegedState(ratio * force, ratio, goal, state.places, state.motors, slack)
 
-    def _slopes(self, truth: PrivilegedState, target: int | None, insertion: bool) -> np.ndarray:
-        """Slopes of the force that counts in what the actions move, ``(actions, d)`` [N/mm]."""
-        equilibrium = self._env.get_wrapper_attr("equilibrium")
+    def _slopes(self, state: PrivilegedState, insertion: bool) -> np.ndarray:
+        """Return the slopes of the regulated force in the actuated displacements, ``(actions, d)`` [N/mm]."""
+        equilibrium, target = self._env.get_wrapper_attr("equilibrium"), self._env.get_wrapper_attr("task").target
         counted = slice(None) if target is None else slice(target, target + 1)
         if isinstance(equilibrium, Equilibrium):
-            slopes = sensitivity(equilibrium).forces[
-                [Sensitivity.CABLE, Sensitivity.LENGTH] if insertion else [Sensitivity.CABLE]
-            ]
+            rows = [Sensitivity.CABLE, Sensitivity.LENGTH] if insertion else [Sensitivity.CABLE]
+            slopes = sensitivity(equilibrium).forces[rows]
         else:
             slopes = spatial_sensitivity(equilibrium).forces[SpatialSensitivity.CABLES]
-        return np.asarray(truth.rigidity_ratio * slopes[:, counted].sum(axis=1))
+        return np.asarray(state.rigidity_ratio * slopes[:, counted].sum(axis=1))
 
-    def _tried(self, truth: PrivilegedState) -> np.ndarray:
-        """The same of the true force, from trial moves that are solved exactly, which is faster."""
+    def _tried(self, state: PrivilegedState) -> np.ndarray:
+        """Return the slopes of the true force from trial moves that are solved exactly, which is faster."""
         probe = self._env.get_wrapper_attr("probe")
-        trials = truth.places + PROBE_MM * np.eye(truth.places.size)
-        return np.array([(probe(places) - truth.force) / PROBE_MM for places in trials])
+        trials = state.places + PROBE_MM * np.eye(state.places.size)
+        return np.array([(probe(places) - state.force) / PROBE_MM for places in trials])

@@ -1,47 +1,42 @@
-"""A trained policy alone: the small network that acts, its normaliser, its configuration and its learning curve.
+"""Trained policies and their files.
 
-One file holds all of it: tensors, of which the weights in half precision, and text, no code. Neither the learner nor
-its critics are needed.
+A file holds the acting network, the normalisation of its inputs, its configuration and its learning curve, as tensors
+(weights in half precision) and JSON: no code, and neither the learner nor its critics.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
-import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
-from torch import nn
 
-import ccr_gym  # noqa: F401 - registers the ids
 from agents.config import TrainConfig
+from agents.environment import Environment, make_env
 from agents.errors import UserError
+from agents.files import JsonObject
 from agents.learning.memory import Memory
-from agents.learning.tensors import read_tensors, write_tensors
+from agents.learning.network import LSTMState, Network, normalized, standard_deviation
+from agents.learning.pretrained import SUFFIX
+from agents.learning.tensors import Tensors, read_tensors, write_tensors
 from agents.policy import Observation
-from agents.tuned import LearnerSettings, RecurrentPPOSettings, SACSettings
+from agents.tuned import RecurrentPPOSettings
 
-SUFFIX = ".safetensors"
 ACTOR = f"actor{SUFFIX}"
 FORMAT = 2
-WEIGHTS = "weights."  # before the names of the network's tensors
-CLIP = 10.0  # of scaled rows
-EPSILON = 1e-8  # of their variance
+WEIGHTS = "weights."  # prefix of the names of the network's tensors
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class LearningCurve:
     """Mean return of validation episodes during training.
 
     Attributes:
-        steps: Environment steps done.
-        returns: Mean return after them.
+        steps: Environment steps before each validation.
+        returns: Mean return of each validation.
     """
 
     steps: tuple[int, ...]
@@ -49,173 +44,132 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class Training:
-    """How a policy was made.
+class TrainingRecord:
+    """How a policy was trained.
 
     Attributes:
-        config: Of the run, without its folder.
-        curve: Its learning curve.
-        seconds: What it took [s].
+        config: Configuration of the run, without its folder.
+        curve: Learning curve.
+        seconds: Duration [s].
     """
 
     config: TrainConfig
-    curve: Curve
+    curve: LearningCurve
     seconds: float
 
 
-class Network(nn.Module):
-    """From a scaled row to the mean action.
+def export(path: Path, network: Network, statistics: RunningMeanStd, training: TrainingRecord) -> None:
+    """Write the file of a trained policy.
 
     Args:
-        inputs: Numbers of a row.
-        actions: Numbers of an action.
-        settings: Of the learner, which say how many units there are.
-    """
-
-    def __init__(self, inputs: int, actions: int, settings: LearnerSettings) -> None:
-        super().__init__()
-        width, self.squashed = settings.width, isinstance(settings, SACSettings)
-        self.lstm = nn.LSTM(inputs, settings.hidden) if isinstance(settings, RecurrentPPOSettings) else None
-        sizes = [inputs, width, width] if self.lstm is None else [self.lstm.hidden_size, width]
-        layers: list[nn.Module] = []
-        for before, after in pairwise(sizes):
-            layers += [nn.Linear(before, after), nn.ReLU() if self.squashed else nn.Tanh()]
-        self.layers = nn.Sequential(*layers, nn.Linear(width, actions))
-
-    def forward(self, row: torch.Tensor, state: Any = None) -> tuple[torch.Tensor, Any]:
-        """Action ``(1, actions)`` of a row ``(1, inputs)``, and what the LSTM keeps."""
-        if self.lstm is not None:
-            row, state = self.lstm(row, state)
-        action = self.unbounded(row)
-        return torch.tanh(action) if self.squashed else action.clip(-1.0, 1.0), state
-
-    def unbounded(self, row: torch.Tensor) -> torch.Tensor:
-        """What is cut or squashed to the bounds of actions."""
-        return torch.as_tensor(self.layers(row))
-
-    @classmethod
-    def of(cls, policy: BasePolicy, settings: LearnerSettings) -> "Network":
-        """The network of a learner's policy."""
-        assert isinstance(policy.observation_space, spaces.Box)
-        assert isinstance(policy.action_space, spaces.Box)
-        network = cls(policy.observation_space.shape[0], policy.action_space.shape[0], settings)
-        trained: Any = policy
-        if network.squashed:
-            parts = [*trained.actor.latent_pi, trained.actor.mu]
-        else:
-            parts = [*trained.mlp_extractor.policy_net, trained.action_net]
-        for mine, theirs in zip(network.layers, parts, strict=True):
-            mine.load_state_dict(theirs.state_dict())
-        if network.lstm is not None:
-            network.lstm.load_state_dict(trained.lstm_actor.state_dict())
-        return network
-
-
-def scaled(rows: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> torch.Tensor:
-    """Rows as a network takes them."""
-    return torch.as_tensor(np.clip((rows - mean) / deviation, -CLIP, CLIP), dtype=torch.float32)
-
-
-def deviation(seen: RunningMeanStd) -> np.ndarray:
-    """What rows are divided by."""
-    return np.asarray(np.sqrt(seen.var + EPSILON))
-
-
-def export(path: Path, network: Network, seen: RunningMeanStd, training: Training) -> None:
-    """Write an actor.
-
-    Args:
-        path: Of its file.
-        network: Trained on scaled rows.
-        seen: Mean and variance that rows are scaled by.
-        training: How it was made.
+        path: Path of the file.
+        network: Network trained on normalised rows.
+        statistics: Mean and variance that rows are normalised by.
+        training: How it was trained.
 
     Raises:
-        UserError: If it cannot be written.
+        UserError: If the file cannot be written.
     """
     weights = {f"{WEIGHTS}{name}": value.half() for name, value in network.state_dict().items()}
-    scaling = {"mean": torch.tensor(seen.mean), "deviation": torch.tensor(deviation(seen))}
+    scaling = {
+        "mean": torch.tensor(statistics.mean).float(),
+        "deviation": torch.tensor(standard_deviation(statistics)).float(),
+    }
     values = {
         "format": FORMAT,
         "config": replace(training.config, run=Path()).dumps(),
         "training": {**asdict(training.curve), "seconds": training.seconds},
     }
-    write_tensors(path, weights | {name: value.float() for name, value in scaling.items()}, values)
-
-
-@contextmanager
-def _refusing_others(path: Path) -> Iterator[None]:
-    """While a file is read: whatever goes wrong is told as what it is."""
-    try:
-        yield
-    except Exception as error:
-        raise UserError(f"{path} is not a trained policy: {error!r}") from error
-
-
-def _training(tensors: Mapping[str, torch.Tensor], values: Mapping[str, Any]) -> Training:
-    """How the policy of a file was made."""
-    if values["format"] != FORMAT:
-        raise ValueError(f"its format is {values['format']}; this version reads {FORMAT}: train it anew")
-    if not all(tensor.isfinite().all() for tensor in tensors.values()):
-        raise ValueError("its weights are not finite")
-    told = values["training"]
-    curve = Curve(tuple(told["steps"]), tuple(told["returns"]))
-    return Training(TrainConfig.loads(values["config"]), curve, float(told["seconds"]))
+    write_tensors(path, weights | scaling, values)
 
 
 class LearnedPolicy:
     """A trained policy.
 
     Args:
-        path: Its file, or the folder of the run that made it.
+        path: File of the policy, or the folder of the run that trained it.
 
     Attributes:
-        name: Of the learner.
-        training: How it was made.
+        name: Name of the learner.
+        training: How it was trained.
 
     Raises:
-        FileNotFoundError: If there is no such file.
-        UserError: If it is something else.
+        FileNotFoundError: If the file does not exist.
+        UserError: If it is not a trained policy.
     """
 
     def __init__(self, path: Path) -> None:
         path = path if path.suffix == SUFFIX else path / ACTOR
         if not path.is_file():
             raise FileNotFoundError(f"{path} is missing; train first: ccr-gym train --run {path.parent}")
-        with _refusing_others(path):
+        with _rejecting(path):
             tensors, values = read_tensors(path)
             self.training = _training(tensors, values)
         config = self.training.config
-        self.name, self._state = config.learner.name, None
-        env: Any = gymnasium.make(config.env_id, sensing=config.sensing, disable_env_checker=True)
-        self._sizes = {key: box.shape for key, box in env.observation_space.items()}
-        recurrent = isinstance(config.learner, RecurrentPPOSettings)
-        self._memory = None if recurrent else Memory(env.observation_space, 1, env.get_wrapper_attr("settings"))
-        inputs = spaces.flatdim(env.observation_space) if self._memory is None else self._memory.size
-        with _refusing_others(path):
+        self.name = config.learner.name
+        self._state: LSTMState | None = None
+        env = make_env(config.env_id, sensing=config.sensing)
+        space: object = env.observation_space
+        assert isinstance(space, spaces.Dict)
+        self._shapes = {key: box.shape for key, box in space.items()}
+        self._memory = None if isinstance(config.learner, RecurrentPPOSettings) else _memory(env, space)
+        inputs = spaces.flatdim(space) if self._memory is None else self._memory.size
+        with _rejecting(path):
             self._mean, self._deviation = (tensors[name].numpy().reshape(inputs) for name in ("mean", "deviation"))
-            self._network = Network(inputs, env.action_space.shape[0], config.learner)
+            self._network = Network(inputs, spaces.flatdim(env.action_space), config.learner)
             weights = {name: value.float() for name, value in tensors.items() if name.startswith(WEIGHTS)}
             self._network.load_state_dict({name.removeprefix(WEIGHTS): value for name, value in weights.items()})
 
-    def reset(self, env: Any = None) -> None:
-        """Forget the episode before."""
+    def reset(self, env: Environment | None = None) -> None:
+        """Forget the last episode."""
         self._state = None
         if self._memory is not None:
-            self._memory.forget()
+            self._memory.reset()
 
     def act(self, observation: Observation) -> np.ndarray:
-        """The mean action for a dictionary observation.
+        """Return the mean action for a dictionary observation.
 
         Raises:
-            ValueError: If the observation is not that of its environment with the sensing it was trained with.
+            ValueError: If the observation is not one of the environment and sensing that the policy was trained with.
         """
-        sizes = {key: value.shape for key, value in observation.items()}
-        if sizes != self._sizes:
+        shapes = {key: value.shape for key, value in observation.items()}
+        if shapes != self._shapes:
             trained = f"{self.training.config.env_id} with {self.training.config.sensing} sensing"
-            raise ValueError(f"the observation has the shapes {sizes}; those of {trained} are {self._sizes}")
+            raise ValueError(
+                f"the observation has the shapes {shapes}; those of {trained}, which the policy was trained with, are "
+                f"{self._shapes}"
+            )
         rows = {key: value[None] for key, value in observation.items()}
-        row = np.concatenate(list(rows.values()), axis=1) if self._memory is None else self._memory.recall(rows)
+        row = np.concatenate(list(rows.values()), axis=1) if self._memory is None else self._memory.update(rows)
         with torch.no_grad():
-            action, self._state = self._network(scaled(row, self._mean, self._deviation), self._state)
+            action, self._state = self._network(normalized(row, self._mean, self._deviation), self._state)
         return np.asarray(action[0].numpy())
+
+
+@contextmanager
+def _rejecting(path: Path) -> Iterator[None]:
+    """Report every error while a file is read as a file that is not a trained policy."""
+    try:
+        yield
+    except Exception as error:
+        raise UserError(f"{path} is not a trained policy: {error!r}") from error
+
+
+def _training(tensors: Tensors, values: JsonObject) -> TrainingRecord:
+    """Return how the policy of a file was trained.
+
+    Raises:
+        ValueError: If the file has another format or weights that are not finite.
+    """
+    if values["format"] != FORMAT:
+        raise ValueError(f"its format is {values['format']}, this version reads {FORMAT}; train the policy again")
+    if not all(tensor.isfinite().all() for tensor in tensors.values()):
+        raise ValueError("its weights are not finite")
+    training = values["training"]
+    curve = LearningCurve(tuple(training["steps"]), tuple(training["returns"]))
+    return TrainingRecord(TrainConfig.loads(values["config"]), curve, float(training["seconds"]))
+
+
+def _memory(env: Environment, space: spaces.Dict) -> Memory:
+    settings = env.get_wrapper_attr("settings")
+    return Memory(space, 1, settings.robot, settings.cable_limit_mm)

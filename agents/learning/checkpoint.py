@@ -1,8 +1,8 @@
-"""Checkpoints: all that a run needs to go on, in one file of tensors and numbers.
+"""Checkpoints: everything that resumes a training run, in one file of tensors and JSON.
 
-A run goes on with the weights, the optimisers' moments, the scaling of observations and rewards, the replay buffer or
-the imitated actions, its counters and its learning curve. Its episodes are new: their seeds, and that of exploration,
-follow from the seed of the run and the steps done.
+That is the weights, the moments of the optimisers, the normalisation of observations and rewards, the replay buffer or
+the imitated actions, the counters and the learning curve. A resumed run plays new episodes: their seeds, and that of
+exploration, follow from the seed of the run and the number of steps done.
 """
 
 import time
@@ -20,24 +20,24 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 
 from agents.config import VALIDATION_SEED, TrainConfig
 from agents.errors import UserError
-from agents.learning.tensors import read_tensors, write_tensors
+from agents.learning.tensors import Tensors, read_tensors, write_tensors
 
 CHECKPOINT = "checkpoint.safetensors"
-CHECKPOINTS = 20  # in a run, at most
-WRITING = 0.05  # share of a run's time that writing them may take
+CHECKPOINTS = 20  # per run, at most
+WRITING = 0.05  # largest share of a run's time that may be spent on writing them
 REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-Tensors = dict[str, torch.Tensor]
+StateDict = dict[str, Any]  # torch's: tensors, numbers, lists and further mappings
 
 
 @dataclass(slots=True)
 class Progress:
-    """How far a run is.
+    """Progress of a run.
 
     Attributes:
         steps: Environment steps done.
-        seconds: What they took [s].
-        curve_steps: Steps after which the policy was validated.
-        curve_returns: Its mean returns then.
+        seconds: Their duration [s].
+        curve_steps: Environment steps before each validation.
+        curve_returns: Mean return of each validation.
     """
 
     steps: int = 0
@@ -45,101 +45,102 @@ class Progress:
     curve_steps: list[int] = field(default_factory=list)
     curve_returns: list[float] = field(default_factory=list)
 
-    def validated(self, steps: int, mean_return: float) -> None:
-        """Add a point to the curve."""
+    def add_validation(self, steps: int, mean_return: float) -> None:
+        """Add a point to the learning curve."""
         self.curve_steps.append(steps)
         self.curve_returns.append(mean_return)
 
 
 @dataclass(frozen=True, slots=True)
-class State:
-    """What a learner goes on with.
+class LearnerState:
+    """What a learner is resumed from.
 
     Attributes:
-        tensors: By name.
-        counters: By name.
+        tensors: Tensors by name.
+        counters: Counters by name.
     """
 
     tensors: Tensors
     counters: dict[str, int] = field(default_factory=dict)
 
 
-class Run:
-    """A run in its folder: how far it is, what was kept of it, and when that is to be kept next.
+class TrainingRun:
+    """A training run: its progress, its last checkpoint, and when the next one is due.
 
     Args:
-        config: Of the run.
+        config: Configuration of the run.
 
     Attributes:
-        config: Of the run.
-        progress: How far it is.
-        state: What its learner goes on with; none where it begins.
-        seed: That of its configuration where it begins; where it goes on another, so that the scenes are new.
+        config: Configuration of the run.
+        progress: Progress so far.
+        state: State of the learner in the checkpoint; ``None`` for a new run.
+        seed: Seed of the configuration for a new run; another one for a resumed run, so that its scenes are new.
 
     Raises:
-        UserError: If its checkpoint is damaged.
+        UserError: If the checkpoint is damaged.
     """
 
     def __init__(self, config: TrainConfig) -> None:
-        self.config, self.progress, self.state = config, Progress(), None
+        self.config, self.progress = config, Progress()
+        self.state: LearnerState | None = None
         self._path = config.run / CHECKPOINT
         if self._path.exists():
-            with self.refusing_damage():
+            with self.rejecting_damage():
                 tensors, values = read_tensors(self._path)
-                self.progress, self.state = Progress(**values["progress"]), State(tensors, values["counters"])
+                self.progress, self.state = Progress(**values["progress"]), LearnerState(tensors, values["counters"])
         self._began = time.perf_counter() - self.progress.seconds
-        self.seed = config.seed if self.state is None else _another_seed(config, self.progress.steps)
-        self._plan(0.0)
+        self.seed = config.seed if self.state is None else _resumed_seed(config, self.progress.steps)
+        self._schedule(0.0)
 
     @property
     def seconds(self) -> float:
-        """What it has taken so far [s]."""
+        """Duration so far [s]."""
         return time.perf_counter() - self._began
 
-    def keep(self, steps: int, state: Callable[[], State]) -> None:
-        """Write a checkpoint in the place of the one before, if it is time.
+    def save_if_due(self, steps: int, state: Callable[[], LearnerState]) -> None:
+        """Replace the checkpoint if the next one is due.
 
         Args:
-            steps: Environment steps done and learnt from.
-            state: Gives what is to be kept.
+            steps: Environment steps done and learned from.
+            state: Returns the state of the learner.
 
         Raises:
-            UserError: If it cannot be written; the one before is kept.
+            UserError: If it cannot be written; the last checkpoint then stays.
         """
         began = self.seconds
-        if steps >= self._next and began >= self._rested:
+        if steps >= self._next_steps and began >= self._next_seconds:
             self.progress.steps, self.progress.seconds = steps, began
-            kept, progress = state(), {name: getattr(self.progress, name) for name in Progress.__slots__}
-            write_tensors(self._path, kept.tensors, {"progress": progress, "counters": kept.counters})
-            self._plan(self.seconds - began)
+            saved, progress = state(), {name: getattr(self.progress, name) for name in Progress.__slots__}
+            write_tensors(self._path, saved.tensors, {"progress": progress, "counters": saved.counters})
+            self._schedule(self.seconds - began)
 
     @contextmanager
-    def refusing_damage(self) -> Iterator[None]:
-        """While a checkpoint is read: whatever goes wrong is told as what it is.
+    def rejecting_damage(self) -> Iterator[None]:
+        """Report every error while a checkpoint is read as a damaged checkpoint.
 
         Raises:
-            UserError: If anything does.
+            UserError: In place of any exception.
         """
         try:
             yield
         except Exception as error:
-            raise UserError(f"{self._path} is damaged ({error!r}); begin again with --restart") from error
+            raise UserError(f"{self._path} is damaged ({error!r}); start the run again with --restart") from error
 
-    def _plan(self, took: float) -> None:
-        """Say when the next one is due, after one that took some seconds."""
-        self._next = self.progress.steps + max(self.config.learner.steps // CHECKPOINTS, 1)
-        self._rested = self.seconds + took / WRITING
-
-
-def _another_seed(config: TrainConfig, steps: int) -> int:
-    drawn = np.random.SeedSequence([config.seed, steps]).generate_state(1)
-    return int(drawn[0]) % (VALIDATION_SEED - config.learner.envs)
+    def _schedule(self, duration: float) -> None:
+        """Set when the next checkpoint is due, after one that took some seconds."""
+        self._next_steps = self.progress.steps + max(self.config.learner.steps // CHECKPOINTS, 1)
+        self._next_seconds = self.seconds + duration / WRITING
 
 
-def learner_state(model: BaseAlgorithm) -> State:
-    """What a learner of Stable-Baselines3 goes on with."""
-    tensors, counters = flat(model.get_parameters()), {"updates": int(model._n_updates)}
-    for name, statistics in _scaling(model).items():
+def _resumed_seed(config: TrainConfig, steps: int) -> int:
+    (seed,) = np.random.SeedSequence([config.seed, steps]).generate_state(1)
+    return int(seed) % (VALIDATION_SEED - config.learner.envs)
+
+
+def learner_state(model: BaseAlgorithm) -> LearnerState:
+    """Return the state of a learner of Stable-Baselines3."""
+    tensors, counters = flatten_states(model.get_parameters()), {"updates": int(model._n_updates)}
+    for name, statistics in _normalization(model).items():
         tensors |= statistics_tensors(name, statistics)
     if isinstance(model, SAC):
         assert model.log_ent_coef is not None
@@ -147,18 +148,19 @@ def learner_state(model: BaseAlgorithm) -> State:
         tensors["log_ent_coef"] = model.log_ent_coef
         tensors |= {f"replay.{name}": torch.from_numpy(getattr(replay, name)[: replay.size()]) for name in REPLAY}
         counters |= {"position": replay.pos, "full": int(replay.full)}
-    return State(tensors, counters)
+    return LearnerState(tensors, counters)
 
 
-def restore_learner(model: BaseAlgorithm, steps: int, state: State) -> None:
-    """Bring an untrained learner to where it was after some steps.
+def restore_learner(model: BaseAlgorithm, steps: int, state: LearnerState) -> None:
+    """Put an untrained learner into a saved state, after some steps.
 
     Raises:
-        Exception: Any, if the state is not of such a learner.
+        Exception: Of any kind, if the state is that of another learner.
     """
-    model.set_parameters(nested(state.tensors, model.get_parameters()), device="cpu")
+    states = nest_states(state.tensors, model.get_parameters())
+    model.set_parameters(states, device="cpu")  # type: ignore[arg-type] # takes more than its annotation says
     model.num_timesteps, model._n_updates = steps, state.counters["updates"]
-    for name, statistics in _scaling(model).items():
+    for name, statistics in _normalization(model).items():
         restore_statistics(name, statistics, state.tensors)
     if isinstance(model, SAC):
         assert model.log_ent_coef is not None
@@ -169,24 +171,24 @@ def restore_learner(model: BaseAlgorithm, steps: int, state: State) -> None:
             getattr(replay, name)[: replay.size()] = state.tensors[f"replay.{name}"].numpy()
 
 
-def flat(states: Mapping[str, Mapping[str, Any]]) -> Tensors:
-    """State dictionaries of modules and optimisers as tensors with names of their own; :func:`nested` undoes it.
+def flatten_states(states: Mapping[str, StateDict]) -> Tensors:
+    """Return the tensors of state dictionaries under unique names; :func:`nest_states` is the inverse.
 
-    Of optimisers the moments are kept; their settings are those of the run.
+    Only the moments of optimisers are kept; their settings are those of the run.
     """
     return {f"{name}/{key}": tensor for name, state in states.items() for key, tensor in _entries(state).items()}
 
 
-def nested(tensors: Tensors, states: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """State dictionaries like some others, filled with what is kept."""
-    filled: dict[str, Any] = {}
+def nest_states(tensors: Tensors, states: Mapping[str, StateDict]) -> dict[str, StateDict]:
+    """Return state dictionaries of the structure of ``states``, with the values of ``tensors``."""
+    nested: dict[str, StateDict] = {}
     for name, state in states.items():
         entries = {key.removeprefix(f"{name}/"): t for key, t in tensors.items() if key.startswith(f"{name}/")}
-        filled[name] = {**state, "state": _moments(entries)} if "param_groups" in state else entries
-    return filled
+        nested[name] = {**state, "state": _moments(entries)} if "param_groups" in state else {**entries}
+    return nested
 
 
-def _entries(state: Mapping[str, Any]) -> Mapping[str, torch.Tensor]:
+def _entries(state: StateDict) -> Mapping[str, torch.Tensor]:
     if "param_groups" not in state:
         return state
     return {f"{index}.{key}": tensor for index, moments in state["state"].items() for key, tensor in moments.items()}
@@ -201,20 +203,19 @@ def _moments(entries: Tensors) -> dict[int, Tensors]:
 
 
 def statistics_tensors(name: str, statistics: RunningMeanStd) -> Tensors:
-    """Running mean and variance as tensors, in double precision."""
+    """Return running mean, variance and count as tensors in double precision."""
     values = {"mean": statistics.mean, "var": statistics.var, "count": statistics.count}
     return {f"{name}.{key}": torch.tensor(value, dtype=torch.float64) for key, value in values.items()}
 
 
 def restore_statistics(name: str, statistics: RunningMeanStd, tensors: Tensors) -> None:
-    """Undo :func:`statistics_tensors`."""
+    """Set running statistics from the tensors of :func:`statistics_tensors`."""
     mean, var, count = (tensors[f"{name}.{key}"].numpy() for key in ("mean", "var", "count"))
     shape = np.shape(statistics.mean)
     statistics.mean, statistics.var, statistics.count = mean.reshape(shape), var.reshape(shape), float(count)
 
 
-def _scaling(model: BaseAlgorithm) -> dict[str, RunningMeanStd]:
-    """Of observations and of rewards."""
+def _normalization(model: BaseAlgorithm) -> dict[str, RunningMeanStd]:
     normalizer = model.get_vec_normalize_env()
     assert normalizer is not None
     assert isinstance(normalizer.obs_rms, RunningMeanStd)

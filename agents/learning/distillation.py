@@ -1,171 +1,203 @@
-"""Imitation of a teacher that knows what is hidden, by a student that sees what every policy sees.
+"""Imitation of a teacher that sees the hidden state, by a student that sees what every policy sees.
 
-The student acts, the teacher says what it would have done, and the student learns that from all rounds so far: S. Ross,
-G. Gordon, D. Bagnell, "A reduction of imitation learning and structured prediction to no-regret online learning"
-(DAgger), AISTATS 2011. What cannot be known from the history is averaged over.
+The student acts, the teacher labels each step with the action it would have taken, and the student learns from the
+labels of all rounds so far: S. Ross, G. Gordon, D. Bagnell, "A reduction of imitation learning and structured
+prediction to no-regret online learning" (DAgger), AISTATS 2011. What the history does not determine is averaged over.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from rich.progress import track
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from torch import nn
 from torch.utils.tensorboard import SummaryWriter
 
 from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED
-from agents.learning.actor import EPSILON, Network, deviation, scaled
-from agents.learning.checkpoint import Run, State, flat, nested, restore_statistics, statistics_tensors
-from agents.learning.learners import environments
-from agents.policy import Observation, effort, search
+from agents.environment import Actuation, Observation
+from agents.learning.checkpoint import (
+    LearnerState,
+    TrainingRun,
+    flatten_states,
+    nest_states,
+    restore_statistics,
+    statistics_tensors,
+)
+from agents.learning.learners import make_envs
+from agents.learning.network import EPSILON, Network, normalized, standard_deviation
+from agents.policy import motor_actions, search
 from agents.tuned import DistilledSettings
 from ccr_gym import PrivilegedState
 
-PROBE_MM = 0.02  # move that the slope of the force is measured with
-LEAST_SLOPE = 1e-3  # slope that is believed [N/mm]
-REACHED_N = 2e-5  # error that the teacher leaves
+PROBE_MM = 0.02  # trial move that the slope of the force is measured with
+LEAST_SLOPE = 1e-3  # smallest slope that is used [N/mm]
+REACHED_N = 2e-5  # force error below which the teacher rests
 
 
-def teach(envs: Any, observation: Observation) -> np.ndarray:
-    """What a controller does that knows the true force, its slope, the play and the next set-point, ``(N, actions)``.
+def teacher_actions(envs: VecEnv, observation: Observation) -> np.ndarray:
+    """Return the actions ``(N, actions)`` of a controller that sees the true force, its slope, backlash and set-point.
 
-    Newton's step to the set-point, with the slope from a trial move of the robots as they are; full speed towards the
-    obstacle before anything touches. In space both cables move along the way of the search, an insertion stays.
+    They are Newton steps to the next set-point, with the slope from a trial move of the robots in their present state;
+    before contact, full speed towards the obstacle. In space both cables move in the direction of the search; an
+    insertion stays where it is.
     """
-    truth: PrivilegedState = envs.get_attr("privileged_state", [0])[0]
-    settings, body = envs.get_attr("settings", [0])[0], envs.get_attr("task", [0])[0].body
-    way = search(observation).astype(float)
-    force = np.linalg.norm(truth.force, axis=1)
-    tried = np.linalg.norm(envs.env_method("probe", truth.places + PROBE_MM * way, indices=[0])[0], axis=1)
-    slope = np.maximum(np.abs(tried - force) / PROBE_MM, LEAST_SLOPE)
-    lacking = np.where(np.abs(truth.goal - force) < REACHED_N, 0.0, truth.goal - force)
-    moves = (lacking / slope)[:, None] * way
-    acts = effort(moves, truth, body.increments(settings))
-    return np.where(force[:, None] > 0, acts, way.astype(np.float32))
+    state: PrivilegedState = envs.get_attr("privileged_state", [0])[0]
+    actuation = Actuation.of(envs.get_attr("task", [0])[0], envs.get_attr("settings", [0])[0])
+    direction = search(observation).astype(float)
+    force = np.linalg.norm(state.force, axis=1)
+    trial = envs.env_method("probe", state.places + PROBE_MM * direction, indices=[0])[0]
+    slope = np.maximum(np.abs(np.linalg.norm(trial, axis=1) - force) / PROBE_MM, LEAST_SLOPE)
+    missing = np.where(np.abs(state.goal - force) < REACHED_N, 0.0, state.goal - force)
+    moves = (missing / slope)[:, None] * direction
+    actions = motor_actions(moves, state, actuation.increments)
+    return np.where(force[:, None] > 0, actions, direction.astype(np.float32))
 
 
 class Student:
-    """A network and the scaling of what it sees, as Stable-Baselines3 plays policies.
+    """A network with the running statistics of its inputs, in the form in which Stable-Baselines3 plays policies.
 
     Args:
         network: The network.
+        inputs: Size of a row.
     """
 
     def __init__(self, network: Network, inputs: int) -> None:
-        self.network, self.seen = network, RunningMeanStd(epsilon=EPSILON, shape=(inputs,))
+        self.network, self.statistics = network, RunningMeanStd(epsilon=EPSILON, shape=(inputs,))
 
-    def scaled(self, rows: np.ndarray) -> torch.Tensor:
-        """Rows as the network takes them."""
-        return scaled(rows, self.seen.mean, deviation(self.seen))
+    def normalized(self, rows: np.ndarray) -> torch.Tensor:
+        """Return rows as the network takes them."""
+        return normalized(rows, self.statistics.mean, standard_deviation(self.statistics))
 
-    def predict(self, rows: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True) -> Any:
-        """Actions for rows, ``(N, actions)``."""
+    def predict(
+        self,
+        observation: np.ndarray | dict[str, np.ndarray],
+        state: tuple[np.ndarray, ...] | None = None,
+        episode_start: np.ndarray | None = None,
+        deterministic: bool = True,
+    ) -> tuple[np.ndarray, tuple[np.ndarray, ...] | None]:
+        """Return the actions for rows, ``(N, actions)``, and the state as it is."""
+        assert isinstance(observation, np.ndarray)
         with torch.no_grad():
-            return self.network(self.scaled(rows))[0].numpy(), state
+            return self.network(self.normalized(observation))[0].numpy(), state
 
 
 class Imitation:
-    """A student, what it has been taught so far, and its optimiser.
+    """A student, the labels of all rounds so far, and the optimiser.
 
     Args:
-        inputs: Numbers of a row.
-        actions: Numbers of an action.
-        settings: Of the learner.
+        inputs: Size of a row.
+        actions: Size of an action.
+        settings: Settings of the learner.
     """
 
     def __init__(self, inputs: int, actions: int, settings: DistilledSettings) -> None:
         self.student, self.settings = Student(Network(inputs, actions, settings), inputs), settings
-        self.count = settings.envs * settings.rollout  # steps of a round
+        self.count = settings.envs * settings.rollout  # steps per round
         self.rounds = max(1, settings.steps // self.count)
         self.rows = np.zeros((self.rounds * self.count, inputs), np.float32)
-        self.taught = np.zeros((self.rounds * self.count, actions), np.float32)
+        self.labels = np.zeros((self.rounds * self.count, actions), np.float32)
         self.adam = torch.optim.Adam(self.student.network.parameters(), lr=settings.learning_rate)
 
-    def state(self, steps: int) -> State:
-        """What it goes on with after some steps."""
-        tensors = flat({"network": self.student.network.state_dict(), "adam": self.adam.state_dict()})
-        kept = {"rows": torch.from_numpy(self.rows[:steps]), "taught": torch.from_numpy(self.taught[:steps])}
-        return State(tensors | kept | statistics_tensors("observations", self.student.seen))
+    def state(self, steps: int) -> LearnerState:
+        """Return the state after some steps."""
+        tensors = flatten_states({"network": self.student.network.state_dict(), "adam": self.adam.state_dict()})
+        data = {"rows": torch.from_numpy(self.rows[:steps]), "labels": torch.from_numpy(self.labels[:steps])}
+        return LearnerState(tensors | data | statistics_tensors("observations", self.student.statistics))
 
-    def restore(self, steps: int, state: State) -> None:
-        """Undo :meth:`state`.
+    def restore(self, steps: int, state: LearnerState) -> None:
+        """Restore a state of :meth:`state`.
 
         Raises:
-            Exception: Any, if the state is not of such a learner.
+            Exception: Of any kind, if the state is that of another learner.
         """
         states = {"network": self.student.network.state_dict(), "adam": self.adam.state_dict()}
-        filled = nested(state.tensors, states)
-        self.student.network.load_state_dict(filled["network"])
-        self.adam.load_state_dict(filled["adam"])
-        self.rows[:steps], self.taught[:steps] = (state.tensors[name].numpy() for name in ("rows", "taught"))
-        restore_statistics("observations", self.student.seen, state.tensors)
+        nested = nest_states(state.tensors, states)
+        self.student.network.load_state_dict(nested["network"])
+        self.adam.load_state_dict(nested["adam"])
+        self.rows[:steps], self.labels[:steps] = (state.tensors[name].numpy() for name in ("rows", "labels"))
+        restore_statistics("observations", self.student.statistics, state.tensors)
+
+    def learn(self, done: int, generator: np.random.Generator) -> float:
+        """Take the gradient steps that follow a round, on batches from all rounds so far; return their mean loss."""
+        total, count, steps = 0.0, (done + 1) * self.count, self.settings.gradient_steps
+        for k in range(done * steps, (done + 1) * steps):
+            for group in self.adam.param_groups:
+                group["lr"] = self.settings.learning_rate * (1 - k / (self.rounds * steps))
+            total += self._descend(generator.integers(count, size=self.settings.batch_size))
+        return total / steps
+
+    def _descend(self, batch: np.ndarray) -> float:
+        """Take one gradient step; return the loss before it."""
+        actions = self.student.network.unbounded(self.student.normalized(self.rows[batch]))
+        labels = torch.from_numpy(self.labels[batch])
+        loss = nn.functional.huber_loss(actions, labels, delta=self.settings.huber)
+        self.adam.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.adam.step()
+        return loss.item()
 
 
-def distill(run: Run, settings: DistilledSettings, log: Path, progress: bool) -> tuple[Network, RunningMeanStd]:
-    """Train a student to the end of a run; its network, and what its rows are scaled by."""
-    config, seed = run.config, run.seed
-    torch.manual_seed(config.seed)
-    generator = np.random.default_rng(seed)
-    envs = environments(config, settings.envs, seed)
-    validation = environments(config, VALIDATION_EPISODES, VALIDATION_SEED)
+@dataclass(slots=True)
+class Rollouts:
+    """Environments in which the student and the teacher act.
+
+    Attributes:
+        envs: Environments that show their dictionary observations.
+        rows: Present rows of observations.
+        generator: Chooses the environments that the teacher drives.
+    """
+
+    envs: VecEnvWrapper
+    rows: np.ndarray
+    generator: np.random.Generator
+
+    def play(self, imitation: Imitation, done: int) -> None:
+        """Play the next round after those done; store its rows and labels."""
+        student, settings, count = imitation.student, imitation.settings, self.envs.num_envs
+        share = max(0.0, 1 - done / settings.weaning)  # of environments that the teacher drives
+        for k in range(imitation.count // count):
+            step = slice(done * imitation.count + k * count, done * imitation.count + (k + 1) * count)
+            labels = teacher_actions(self.envs, self.envs.shown)
+            imitation.rows[step], imitation.labels[step] = self.rows, labels
+            driven = self.generator.random(count) < share
+            actions = labels if driven.all() else student.predict(self.rows)[0]
+            rows, *_ = self.envs.step(np.where(driven[:, None], labels, actions))
+            assert isinstance(rows, np.ndarray)
+            self.rows = rows
+
+
+def distill(run: TrainingRun, settings: DistilledSettings, log: Path, progress: bool) -> tuple[Network, RunningMeanStd]:
+    """Train a student to the end of a run; return its network and the statistics that its rows are normalised by."""
+    torch.manual_seed(run.config.seed)
+    envs = make_envs(run.config, settings.envs, run.seed)
+    validation = make_envs(run.config, VALIDATION_EPISODES, VALIDATION_SEED)
     (inputs,), (actions,) = envs.observation_space.shape or (), envs.action_space.shape or ()
     imitation = Imitation(inputs, actions, settings)
-    student = imitation.student
     if run.state:
-        with run.refusing_damage():
+        with run.rejecting_damage():
             imitation.restore(run.progress.steps, run.state)
-    first, rows = run.progress.steps // imitation.count, envs.reset()
+    rows, generator = envs.reset(), np.random.default_rng(run.seed)
+    assert isinstance(rows, np.ndarray)
+    rollouts, first = Rollouts(envs, rows, generator), run.progress.steps // imitation.count
     with SummaryWriter(str(log)) as writer:
         for done in track(range(first, imitation.rounds), "distil", disable=not progress):
-            here = slice(done * imitation.count, (done + 1) * imitation.count)
-            share = max(0.0, 1 - done / settings.weaning)
-            rows = _play(envs, student, rows, (imitation.rows[here], imitation.taught[here]), share, generator)
-            student.seen.update(imitation.rows[here])
-            writer.add_scalar("train/loss", _learn(imitation, done, generator), here.stop)
+            steps = (done + 1) * imitation.count
+            rollouts.play(imitation, done)
+            imitation.student.statistics.update(imitation.rows[steps - imitation.count : steps])
+            writer.add_scalar("train/loss", imitation.learn(done, generator), steps)
             if (done + 1) % max(1, imitation.rounds // CURVE_POINTS) == 0:
-                played: Any = student
-                mean: Any = evaluate_policy(played, validation, VALIDATION_EPISODES)[0]
-                run.progress.validated(here.stop, float(mean))
-                writer.add_scalar("eval/mean_reward", float(mean), here.stop)
-            run.keep(here.stop, lambda: imitation.state(here.stop))  # noqa: B023 - called at once
-    return student.network, student.seen
+                mean_return = _validate(imitation.student, validation)
+                run.progress.add_validation(steps, mean_return)
+                writer.add_scalar("eval/mean_reward", mean_return, steps)
+            run.save_if_due(steps, lambda: imitation.state(steps))  # noqa: B023 - called at once
+    return imitation.student.network, imitation.student.statistics
 
 
-def _play(
-    envs: Any,
-    student: Student,
-    rows: Any,
-    kept: tuple[np.ndarray, np.ndarray],
-    share: float,
-    generator: np.random.Generator,
-) -> Any:
-    """Play a round, in a share of the environments by the teacher, and keep what was seen and taught."""
-    steps = len(kept[0]) // envs.num_envs
-    for k in range(steps):
-        here = slice(k * envs.num_envs, (k + 1) * envs.num_envs)
-        kept[0][here], kept[1][here] = rows, teach(envs, envs.shown)
-        taught = generator.random(envs.num_envs) < share
-        actions = kept[1][here] if taught.all() else student.predict(rows)[0]
-        rows, *_ = envs.step(np.where(taught[:, None], kept[1][here], actions))
-    return rows
-
-
-def _learn(imitation: Imitation, done: int, generator: np.random.Generator) -> float:
-    """Gradient steps on batches of all that is kept after some rounds; the mean loss."""
-    settings, student, total = imitation.settings, imitation.student, 0.0
-    seen, steps = (done + 1) * imitation.count, settings.gradient_steps
-    for k in range(done * steps, (done + 1) * steps):
-        for group in imitation.adam.param_groups:
-            group["lr"] = settings.learning_rate * (1 - k / (imitation.rounds * steps))
-        batch = generator.integers(seen, size=settings.batch_size)
-        acts = student.network.unbounded(student.scaled(imitation.rows[batch]))
-        taught = torch.from_numpy(imitation.taught[batch])
-        loss = nn.functional.huber_loss(acts, taught, delta=settings.huber)
-        imitation.adam.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        imitation.adam.step()
-        total += loss.item()
-    return total / steps
+def _validate(student: Student, envs: VecEnv) -> float:
+    """Return the mean return of validation episodes."""
+    mean, _ = evaluate_policy(student, envs, VALIDATION_EPISODES)
+    return float(np.mean(mean))  # a number, which is typed as one or many

@@ -1,4 +1,4 @@
-"""Training of all learned baselines, several runs side by side."""
+"""Training of all learned baselines, with several runs in parallel."""
 
 import shutil
 from concurrent.futures import as_completed
@@ -6,17 +6,17 @@ from dataclasses import replace
 
 from rich.progress import track
 
-from agents.benchmark.suite import folder_name
 from agents.config import RetrainConfig, TrainConfig
 from agents.files import replacing
-from agents.learning.actor import ACTOR, SUFFIX
+from agents.learning.actor import ACTOR
+from agents.learning.pretrained import SUFFIX, folder_name
 from agents.learning.training import is_finished, train
 from agents.tuned import LEARNERS
-from agents.workers import workers
+from agents.workers import worker_pool
 
 
 def runs(config: RetrainConfig) -> list[TrainConfig]:
-    """The runs that are asked for."""
+    """Return the configurations of all runs."""
     return [
         TrainConfig(
             run=config.out / learner / folder_name(env_id) / str(seed),
@@ -33,17 +33,17 @@ def runs(config: RetrainConfig) -> list[TrainConfig]:
 
 
 def retrain(config: RetrainConfig) -> None:
-    """Train what is not trained yet, and put the actors where evaluation finds shipped ones, in ``out``.
+    """Train what is not finished yet, and copy the policies to where ``evaluate --pretrained`` looks for them.
 
     Raises:
-        UserError: If a run is there with other settings; all are left as they are.
+        UserError: If a folder holds a run with other settings; nothing is changed then.
     """
-    asked = runs(config)
-    missing = [run for run in asked if not is_finished(run)]
-    with workers(config.jobs) as pool:
-        waiting = [pool.submit(train, run, False) for run in missing]
-        for future in track(as_completed(waiting), "retrain", len(waiting)):
+    configs = runs(config)
+    missing = [run for run in configs if not is_finished(run)]
+    with worker_pool(config.jobs) as pool:
+        futures = [pool.submit(train, run, False) for run in missing]
+        for future in track(as_completed(futures), "retrain", len(futures)):
             future.result()
-    for run in asked:
+    for run in configs:
         with replacing(run.run.with_suffix(SUFFIX)) as partial:
             shutil.copyfile(run.run / ACTOR, partial)

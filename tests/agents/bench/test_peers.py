@@ -11,7 +11,7 @@ from agents.bench.peers import (
     free_tip_error,
     mujoco_path,
     our_path,
-    sliding_robot,
+    rod,
     sqp_times,
 )
 
@@ -27,7 +27,7 @@ def test_the_sqp_method_finds_our_nodes():
 def test_without_mujoco_the_remedy_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(ModuleNotFoundError, match="pip install mujoco"):
-        MujocoChain(sliding_robot(), None)
+        MujocoChain(rod(), None)
 
 
 def test_mujocos_free_tip_is_ours():

@@ -12,11 +12,12 @@ import torch
 from agents import cli
 from agents.benchmark import report, suite
 from agents.benchmark.evaluate import METRICS, Episode, measure, scores
-from agents.benchmark.suite import Entry, play, trained
+from agents.benchmark.suite import Entry, play
 from agents.benchmark.sweep import sweep
 from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
 from agents.learning import training
-from agents.learning.actor import ACTOR, SUFFIX, LearnedPolicy
+from agents.learning.actor import ACTOR, LearnedPolicy
+from agents.learning.pretrained import SUFFIX, trained
 from agents.learning.retrain import retrain
 from agents.learning.tensors import read_tensors, write_tensors
 from agents.learning.training import train
@@ -32,9 +33,9 @@ SMALL = PPOSettings(steps=512, envs=4, rollout=32, batch_size=64, epochs=1, widt
 def episode(true, goal=0.1, cost=0.0):
     true = np.asarray(true, float)
     goals = np.full(len(true), goal)
-    lacking = np.abs(true - goals)
+    errors = np.abs(true - goals)
     return Episode(
-        goals, lacking, 2 * lacking, true, true, np.full(len(true), cost), (Status.CONVERGED,) * len(true), (), 1.0
+        goals, errors, 2 * errors, true, true, np.full(len(true), cost), (Status.CONVERGED,) * len(true), (), 1.0
     )
 
 
@@ -89,8 +90,8 @@ def test_the_share_that_is_closed_and_whether_intervals_are_apart():
     rivals = [result("PI", 9 + np.linspace(0, 2, 20)), result("Oracle", np.zeros(20))]
     good, poor = result("PPO", np.full(20, 2.5)), result("SAC", np.linspace(5, 14, 20))
     assert report.closed(good, rivals) == pytest.approx(0.75)
-    assert report.apart(good, rivals)
-    assert not report.apart(poor, rivals)
+    assert report.is_below(good, rivals)
+    assert not report.is_below(poor, rivals)
     assert report.closed(good, rivals[1:]) is None
 
 
@@ -187,14 +188,14 @@ def test_shipped_policies_load_and_are_of_their_environment(file):
     assert policy.training.config.sensing == "realistic"
 
 
-def agrees(found, told):
-    """Whether at least a third of some scenes' errors are those of the table, to 1 %.
+def agrees(found, table):
+    """Return whether at least a third of some scenes' errors are those of the table, to 1 %.
 
     In single precision another processor rounds differently. Most scenes do not care, but where a closed loop is on the
     edge, as at a switch of the memory, it amplifies the last bit, up to twice the error: five of twelve scenes of one
     policy, none of most. Errors of another policy agree by chance, at most one of twelve.
     """
-    return np.mean(np.abs(found - told) <= 0.01 * np.abs(told) + 2e-3) >= 1 / 3
+    return np.mean(np.abs(found - table) <= 0.01 * np.abs(table) + 2e-3) >= 1 / 3
 
 
 def first_scores(file, env_id):
@@ -211,8 +212,8 @@ def test_shipped_policies_give_the_numbers_of_the_table(name):
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
 def test_no_policy_gives_the_numbers_of_another(env_id):
     table = {learner: np.array(SCORES[f"{learner} {env_id}"][:SCENES]) for learner in LEARNERS}
-    for found, told in itertools.permutations(table, 2):
-        assert not agrees(table[found], table[told]), (found, told)
+    for one, other in itertools.permutations(table, 2):
+        assert not agrees(table[one], table[other]), (one, other)
 
 
 @pytest.mark.parametrize("noise", [0.02, None], ids=["other weights", "untrained"])

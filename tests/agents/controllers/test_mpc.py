@@ -29,9 +29,9 @@ def test_effort_makes_it_gentler():
 
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
 def test_it_regulates_with_realistic_sensing(env_id):
-    told = {"sensing": "realistic", "split": "train"}
+    kwargs = {"sensing": "realistic", "split": "train"}
     planned, integral = (
-        scores(kind.tuned(env_id), env_id, 50, 8, **told) for kind in (PredictiveController, ForceController)
+        scores(kind.tuned(env_id), env_id, 50, 8, **kwargs) for kind in (PredictiveController, ForceController)
     )
     assert np.median(planned) < np.median(integral) / 2
 

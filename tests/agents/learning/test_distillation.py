@@ -7,7 +7,7 @@ from agents.config import TrainConfig
 from agents.controllers.newton import NewtonController
 from agents.learning import distillation
 from agents.learning.actor import LearnedPolicy
-from agents.learning.distillation import REACHED_N, teach
+from agents.learning.distillation import REACHED_N, teacher_actions
 from agents.learning.memory import MemoryVecEnv
 from agents.learning.sb3_adapter import SB3VecEnv
 from agents.learning.training import train
@@ -21,13 +21,13 @@ def test_the_teacher_is_exact_and_moves_nothing_by_trying(env_id):
     envs.reset()
     for _ in range(62):
         before = envs.get_attr("privileged_state", [0])[0]
-        actions = teach(envs, envs.shown)
+        actions = teacher_actions(envs, envs.shown)
         after = envs.get_attr("privileged_state", [0])[0]
         assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
         assert np.abs(actions).max() <= 1
         envs.step(actions)
-    truth = envs.get_attr("privileged_state", [0])[0]
-    missed = np.abs(np.linalg.norm(truth.force, axis=1) - truth.goal)
+    state = envs.get_attr("privileged_state", [0])[0]
+    missed = np.abs(np.linalg.norm(state.force, axis=1) - state.goal)
     assert np.median(missed) < (0.005 if "Track" in env_id else 1e-4)
 
 
@@ -41,10 +41,10 @@ def test_the_teacher_does_what_newtons_controller_does():
     observation, _ = env.reset(seed=8)
     controller.reset(env)
     for _ in range(40):
-        taught, known = teach(envs, envs.shown)[0], controller.act(observation)
+        label, known = teacher_actions(envs, envs.shown)[0], controller.act(observation)
         if abs(np.linalg.norm(env.unwrapped.privileged_state.force) - env.unwrapped.privileged_state.goal) < REACHED_N:
             break
-        assert taught == pytest.approx(known, abs=0.02)  # the slope of a trial move is not that at a point
+        assert label == pytest.approx(known, abs=0.02)  # the slope of a trial move is not that at a point
         envs.step(known[None])
         observation, *_ = env.step(known)
 
@@ -56,6 +56,6 @@ def test_a_student_learns(tmp_path, monkeypatch):
     student = LearnedPolicy(train(config, progress=False))
     assert student.name == "Distilled"
     assert student.training.curve.returns[-1] > student.training.curve.returns[0]
-    told = {"sensing": "realistic", "split": "train"}
-    assert np.median(scores(student, config.env_id, 300, 12, **told)) < 12  # 2 after the full training
+    kwargs = {"sensing": "realistic", "split": "train"}
+    assert np.median(scores(student, config.env_id, 300, 12, **kwargs)) < 12  # 2 after the full training
     assert any(tmp_path.glob("log_1/events*"))

@@ -12,14 +12,15 @@ import pytest
 import torch
 
 from agents import files
-from agents.benchmark.suite import trained
 from agents.config import TrainConfig
 from agents.errors import UserError
 from agents.files import locked
 from agents.learning import checkpoint, distillation, training
-from agents.learning.actor import ACTOR, CLIP, EPSILON, LearnedPolicy, Network, export
+from agents.learning.actor import ACTOR, LearnedPolicy, export
 from agents.learning.checkpoint import learner_state
-from agents.learning.learners import KINDS, environments, learner, scaled
+from agents.learning.learners import ALGORITHMS, make_envs, make_learner, normalized_envs
+from agents.learning.network import CLIP, EPSILON, Network
+from agents.learning.pretrained import trained
 from agents.learning.tensors import read_tensors, write_tensors
 from agents.learning.training import is_finished, train
 from agents.tuned import DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings
@@ -55,7 +56,7 @@ def test_the_actor_acts_as_the_learner_does(name, tmp_path, monkeypatch):
     monkeypatch.setattr(training.Network, "of", of)
     config = TrainConfig(run=tmp_path, learner=SMALL[name], threads=1)
     actor = LearnedPolicy(train(config, progress=False))
-    policy, statistics, rows = kept["policy"], kept["statistics"], environments(config, 1, 7)
+    policy, statistics, rows = kept["policy"], kept["statistics"], make_envs(config, 1, 7)
     env = gymnasium.make(config.env_id, disable_env_checker=True, sensing=config.sensing, split="train")
     observation, _ = env.reset(seed=7)
     seen, state = rows.reset(), None
@@ -75,17 +76,17 @@ def test_the_actor_acts_as_the_learner_does(name, tmp_path, monkeypatch):
 
 @pytest.fixture
 def killed(monkeypatch):
-    """Ends training after each checkpoint, as a kill there would; how often, in a list of one."""
+    """End training after each checkpoint, as a kill would; returns the number of kills in a list of one."""
 
-    def keep_and_end(self, steps, state):
-        before = self._next
-        keep(self, steps, state)
-        if self._next != before:
+    def save_and_end(self, steps, state):
+        before = self._next_steps
+        save(self, steps, state)
+        if self._next_steps != before:
             kills[0] += 1
             raise KeyboardInterrupt
 
-    keep, kills = checkpoint.Run.keep, [0]
-    monkeypatch.setattr(checkpoint.Run, "keep", keep_and_end)
+    save, kills = checkpoint.TrainingRun.save_if_due, [0]
+    monkeypatch.setattr(checkpoint.TrainingRun, "save_if_due", save_and_end)
     return kills
 
 
@@ -102,7 +103,7 @@ def test_a_killed_run_goes_on_and_continues_its_curve(name, tmp_path, monkeypatc
     config = TrainConfig(run=tmp_path, learner=SMALL[name], threads=1)
     with pytest.raises(KeyboardInterrupt):
         train(config, progress=False)
-    kept = checkpoint.Run(config)
+    kept = checkpoint.TrainingRun(config)
     assert 700 <= kept.progress.steps < config.learner.steps
     assert kept.seed != config.seed
     assert not (tmp_path / ACTOR).exists()
@@ -130,8 +131,8 @@ def test_a_learner_is_restored_bit_for_bit(name, tmp_path, monkeypatch, killed):
     monkeypatch.setattr(checkpoint, "CHECKPOINTS", 3)
     with pytest.raises(KeyboardInterrupt):
         train(config, progress=False)
-    run, (kept,) = checkpoint.Run(config), states
-    fresh = learner(scaled(environments(config, config.learner.envs, run.seed), config), config)
+    run, (kept,) = checkpoint.TrainingRun(config), states
+    fresh = make_learner(normalized_envs(make_envs(config, config.learner.envs, run.seed), config), config)
     checkpoint.restore_learner(fresh, run.progress.steps, run.state)
     again = learner_state(fresh)
     assert again.counters == kept.counters
@@ -159,10 +160,10 @@ def test_a_run_killed_after_every_checkpoint_learns_as_one_left_alone(name, tmp_
         monkeypatch.setattr(module, "VALIDATION_EPISODES", 16)
         monkeypatch.setattr(module, "CURVE_POINTS", 4)
     monkeypatch.setattr(checkpoint, "CHECKPOINTS", ROLLOUTS[name])
-    told = {"env_id": "CCR/LoadCell-v0", "sensing": "ideal", "learner": LEARNING[name], "threads": 1}
-    alone = until_finished(TrainConfig(run=tmp_path / "alone", **told)).training.curve.returns
+    kwargs = {"env_id": "CCR/LoadCell-v0", "sensing": "ideal", "learner": LEARNING[name], "threads": 1}
+    alone = until_finished(TrainConfig(run=tmp_path / "alone", **kwargs)).training.curve.returns
     kills = request.getfixturevalue("killed")
-    killed = until_finished(TrainConfig(run=tmp_path / "killed", **told)).training.curve.returns
+    killed = until_finished(TrainConfig(run=tmp_path / "killed", **kwargs)).training.curve.returns
     assert kills[0] >= ROLLOUTS[name] - 1
     assert len(killed) == len(alone)
     assert killed[-1] > alone[-1] - 15
@@ -179,10 +180,10 @@ def test_writing_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoint.time, "perf_counter", lambda: clock[0])
     monkeypatch.setattr(checkpoint, "write_tensors", write)
     monkeypatch.setattr(checkpoint, "WRITING", 0.05)
-    run = checkpoint.Run(TrainConfig(run=tmp_path, learner=PPOSettings(steps=100)))
+    run = checkpoint.TrainingRun(TrainConfig(run=tmp_path, learner=PPOSettings(steps=100)))
     for steps in range(1, 101):
         clock[0] += 1.0
-        run.keep(steps, lambda: checkpoint.State({}))
+        run.save_if_due(steps, lambda: checkpoint.LearnerState({}))
     assert len(written) == 5
     assert np.diff(written).min() >= 20
 
@@ -212,7 +213,7 @@ def contents(folder):
 def test_a_folder_of_something_else_is_left_as_it_is(tmp_path, name, restart):
     (tmp_path / name).parent.mkdir(exist_ok=True)
     (tmp_path / name).write_bytes(b"mine")
-    with pytest.raises(UserError, match="give a new or an empty folder"):
+    with pytest.raises(UserError, match="choose a new or empty folder"):
         train(TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1, restart=restart), False)
     assert contents(tmp_path) == {name: b"mine"}
 
@@ -246,7 +247,7 @@ def test_two_processes_do_not_train_in_one_folder(tmp_path):
 
 
 def test_every_learner_has_an_algorithm():
-    assert {kind.name for kind in KINDS} == set(SMALL)
+    assert {kind.name for kind in ALGORITHMS} == set(SMALL)
 
 
 class Payload:
@@ -322,7 +323,7 @@ def test_a_damaged_checkpoint_is_refused_and_runs_nothing(tmp_path, monkeypatch,
     contents_ = [*damaged(path.read_bytes(), tmp_path / "witness"), (tmp_path / "fewer").read_bytes()]
     for content in contents_:
         path.write_bytes(content)
-        with pytest.raises(UserError, match=r"is damaged .*; begin again with --restart"):
+        with pytest.raises(UserError, match=r"is damaged .*; start the run again with --restart"):
             train(config, progress=False)
         assert path.read_bytes() == content
     assert not (tmp_path / "witness").exists()

@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 
 from agents import cli
-from agents.paper import published as paper
-from agents.paper.reproduce import calibrated, table_1
+from agents.paper import published
+from agents.paper.model import calibrate, table_1
 
 
 def test_table_1_by_straight_line_slopes():
     """Paper, Table 1: μ from d = 31 mm, 250 g, then its theoretical column and its mean error."""
-    column = table_1(*calibrated())
-    assert column == pytest.approx(paper.THEORETICAL, abs=0.1)
-    errors = np.abs(np.array(list(paper.MEASURED.values())) - column)
+    column = table_1(*calibrate())
+    assert column == pytest.approx(published.THEORETICAL_G, abs=0.1)
+    errors = np.abs(np.array(list(published.MEASURED_G.values())) - column)
     assert errors.size == 28
-    assert errors.mean() < paper.CLAIMED_MEAN_ERROR
-    assert errors.max() > paper.CLAIMED_MAX_ERROR
+    assert errors.mean() < published.CLAIMED_MEAN_ERROR_G
+    assert errors.max() > published.CLAIMED_MAX_ERROR_G
 
 
 def test_the_command_writes_a_page_and_a_verdict_on_every_claim(tmp_path, monkeypatch, capsys):
