@@ -58,8 +58,8 @@ class TrainConfig:
     """The learner and its settings."""
 
     def __post_init__(self) -> None:
-        _check_names("env_id", (self.env_id,), tuple(ENV_IDS))
-        _check_names("sensing", (self.sensing,), ("ideal", "realistic"))
+        _check_choice("env_id", self.env_id, tuple(ENV_IDS))
+        _check_choice("sensing", self.sensing, ("ideal", "realistic"))
         _check_counts(self, "threads")
         _check_learner(self.learner)
         last = VALIDATION_SEED - self.learner.envs
@@ -183,7 +183,7 @@ class SweepConfig:
     """Folder for the study; an existing study is resumed."""
 
     def __post_init__(self) -> None:
-        _check_names("env_id", (self.env_id,), tuple(ENV_IDS))
+        _check_choice("env_id", self.env_id, tuple(ENV_IDS))
         _check_counts(self, "trials", "episodes", "steps")
 
 
@@ -212,6 +212,11 @@ class ReproduceConfig:
 
     out: Path = Path("runs/paper")
     """Folder for paper.png and paper.json."""
+
+
+def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ValueError(f"{field} is {value!r}; it must be one of {', '.join(choices)}")
 
 
 def _check_names(field: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:

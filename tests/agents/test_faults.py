@@ -1,4 +1,4 @@
-"""What goes wrong outside a command ends in one line and an exit code, and nothing is lost or left half-written."""
+"""Errors outside a command end in one line and an exit code, and nothing is lost or left half-written."""
 
 import errno
 import os
@@ -46,13 +46,13 @@ def started(*arguments, **options):
 
 
 def ended(process, timeout=60):
-    """Exit code and lines of the error stream."""
+    """Return the exit code and the lines of the error stream."""
     _, err = process.communicate(timeout=timeout)
     return process.returncode, err.splitlines()
 
 
 def called(monkeypatch, capsys, *arguments):
-    """The same in this process."""
+    """Return the same for a command in this process."""
     monkeypatch.setattr(sys, "argv", ["ccr-gym", *map(str, arguments)])
     with pytest.raises(SystemExit) as caught:
         cli.main()
@@ -117,7 +117,7 @@ def test_a_bug_shows_where_it_is_and_an_interrupt_does_not(name, monkeypatch, ca
 @pytest.mark.parametrize("name", ["train", "evaluate", "retrain"])
 @pytest.mark.parametrize("seconds", [0.2, 6.0], ids=["loading", "working"])
 def test_an_interrupt_ends_a_command_in_one_line_and_leaves_no_process(name, seconds, tmp_path):
-    """As a terminal does it: the signal goes to all processes of the command."""
+    """As in a terminal, all processes of the command get the signal."""
     process = started(name, "--run" if name == "train" else "--out", tmp_path / "out", start_new_session=True)
     time.sleep(seconds)
     os.killpg(process.pid, signal.SIGINT)
@@ -141,7 +141,7 @@ def test_help_loads_no_learning_library():
 
 
 def limited(size):
-    """What makes a disk fill for a process: no file may grow beyond some bytes."""
+    """Return a function that limits the size of files, as if the disk were full."""
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 

@@ -160,7 +160,7 @@ def test_the_command_line_exits_before_any_work(arguments, tmp_path, monkeypatch
     monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
     with pytest.raises(SystemExit, match="2"):
         cli.main()
-    words = ("at least", "must name", "must be above", "must be from", "sarsa")
+    words = ("at least", "must name", "must be one of", "must be above", "must be from", "sarsa")
     written = " ".join(capsys.readouterr().err.split())
     assert any(word in written for word in words)
     assert list(tmp_path.iterdir()) == []

@@ -167,7 +167,7 @@ def test_a_run_killed_after_every_checkpoint_learns_as_one_left_alone(name, tmp_
     assert kills[0] >= ROLLOUTS[name] - 1
     assert len(killed) == len(alone)
     assert killed[-1] > alone[-1] - 15
-    if name != "Distilled":  # which has learnt nearly all in its first round
+    if name != "Distilled":  # it has learned nearly all in its first round
         assert min(alone[-1], killed[-1]) > max(alone[0], killed[0]) + 15
 
 
@@ -251,7 +251,7 @@ def test_every_learner_has_an_algorithm():
 
 
 class Payload:
-    """What runs code where it is unpickled."""
+    """Runs code when it is unpickled."""
 
     def __init__(self, witness):
         self.witness = witness
