@@ -1,1 +1,62 @@
-"""Learners, classical controllers and the command line on top of ccr_gym."""
+"""Controllers, trained policies, the benchmark and the ``ccr-gym`` command, on top of :mod:`ccr_gym`.
+
+Every name below is imported when it is first used, so that ``import agents`` loads no learning library.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from agents.benchmark.evaluate import Episode as Episode
+    from agents.benchmark.evaluate import Metrics as Metrics
+    from agents.benchmark.evaluate import measure as measure
+    from agents.benchmark.evaluate import run_episode as run_episode
+    from agents.benchmark.evaluate import run_episodes as run_episodes
+    from agents.benchmark.evaluate import scores as scores
+    from agents.controllers.force import ForceController as ForceController
+    from agents.controllers.mpc import PredictiveController as PredictiveController
+    from agents.controllers.newton import NewtonController as NewtonController
+    from agents.learning.actor import LearnedPolicy as LearnedPolicy
+    from agents.learning.differentiable import differentiable as differentiable
+    from agents.learning.memory import MemoryVecEnv as MemoryVecEnv
+    from agents.learning.pretrained import trained as trained
+    from agents.learning.sb3_adapter import SB3VecEnv as SB3VecEnv
+    from agents.paper.reproduce import reproduce as reproduce
+    from agents.policy import Observation as Observation
+    from agents.policy import Policy as Policy
+
+PART_OF = "ccr-gym"  # tells this package from others of its name
+_MODULES = {
+    "Episode": "benchmark.evaluate",
+    "ForceController": "controllers.force",
+    "LearnedPolicy": "learning.actor",
+    "MemoryVecEnv": "learning.memory",
+    "Metrics": "benchmark.evaluate",
+    "NewtonController": "controllers.newton",
+    "Observation": "policy",
+    "Policy": "policy",
+    "PredictiveController": "controllers.mpc",
+    "SB3VecEnv": "learning.sb3_adapter",
+    "differentiable": "learning.differentiable",
+    "measure": "benchmark.evaluate",
+    "reproduce": "paper.reproduce",
+    "run_episode": "benchmark.evaluate",
+    "run_episodes": "benchmark.evaluate",
+    "scores": "benchmark.evaluate",
+    "trained": "learning.pretrained",
+}
+__all__ = list(_MODULES)
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name on its first use."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value: object = getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return all names, including those not imported yet."""
+    return sorted({*globals(), *_MODULES})

@@ -1,6 +1,6 @@
-"""What the ``ccr-gym`` command does."""
+"""The commands of ``ccr-gym``; each imports what it needs when it runs."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -23,77 +23,86 @@ Command = (
 )
 
 
-def train(config: TrainConfig) -> None:
-    """Train a policy on an environment, or go on with a run that was interrupted."""
-    from agents.training import is_finished
-    from agents.training import train as run
+def run() -> None:
+    """Parse the command line and run the command."""
+    match parse():
+        case TrainConfig() as config:
+            train(config)
+        case EvaluateConfig() as config:
+            evaluate(config)
+        case RetrainConfig() as config:
+            retrain(config)
+        case SweepConfig() as config:
+            sweep(config)
+        case BenchConfig() as config:
+            bench(config)
+        case ReproduceConfig() as config:
+            reproduce(config)
 
-    if is_finished(config):
-        print(f"{config.run} is finished already; --restart trains it anew")
+
+def parse() -> Command:
+    """Return the command and its settings from the command line.
+
+    Raises:
+        SystemExit: If it asks for help or has an error, after printing either.
+    """
+    settings = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes)
+    command: Command = tyro.cli(Command, prog="ccr-gym", config=settings)
+    return command
+
+
+def train(config: TrainConfig) -> None:
+    """Train a policy, or resume an interrupted run."""
+    from agents.learning import training
+
+    if training.is_finished(config):
+        print(f"{config.run} is already finished; --restart trains it again from the beginning")
         return
-    folder = run(config)
+    folder = training.train(config)
     print(f"Trained {config.learner.name} for {config.learner.steps} steps on {config.env_id}; saved to {folder}")
 
 
 def evaluate(config: EvaluateConfig) -> None:
-    """Evaluate policies on test scenes they were never trained or tuned on."""
+    """Evaluate policies on test scenes."""
     from rich.progress import track
 
-    from agents import report, suite
+    from agents.benchmark import report, suite
 
-    played = suite.entries(config)
+    entries = suite.entries(config)
     (config.out / "videos").mkdir(parents=True, exist_ok=True)
-    results = list(track(suite.play_all(config, played), "evaluate", len(played)))
-    report.write(sorted(results, key=lambda result: played.index(result.entry)), config)
-    print("Force error: root mean square after the search, interquartile mean with its 95 % interval.")
-    print(f"closed: share of the way from {report.RIVAL} to {report.BOUND}; * where the intervals are disjoint.")
+    results = list(track(suite.play_all(config, entries), "evaluate", len(entries)))
+    report.write(sorted(results, key=lambda result: entries.index(result.entry)), config)
+    print("Force error: root mean square after the search, as interquartile mean with its 95 % interval.")
+    print(f"closed: share of the gap from {report.BASELINE} to {report.BOUND}; * where the intervals do not overlap.")
     print(f"Written: {config.out}/evaluation.json, evaluation.md, figures and videos")
 
 
 def retrain(config: RetrainConfig) -> None:
-    """Train every learned baseline on every environment, as the shipped policies were."""
-    from agents.retrain import retrain as run
+    """Train the learned baselines on every environment."""
+    from agents.learning import retrain
 
-    run(config)
+    retrain.retrain(config)
 
 
 def sweep(config: SweepConfig) -> None:
-    """Search settings of a controller or a learner on training scenes, with Optuna."""
-    from agents.sweep import sweep as run
+    """Tune a controller or a learner."""
+    from agents.benchmark import sweep
 
-    study = run(config)
-    print(f"Best of {len(study.trials)}: {study.best_value:.3f} mN with {study.best_params}")
+    study = sweep.sweep(config)
+    print(f"Best of {len(study.trials)} trials: {study.best_value:.3f} mN with {study.best_params}")
 
 
 def bench(config: BenchConfig) -> None:
-    """Measure the kernel, the environments and a learner on them, beside peers in the same run."""
-    from agents.bench.report import bench as run
+    """Measure the speed of kernel, environments and learning."""
+    from agents.bench import report
 
-    run(config)
+    report.bench(config)
 
 
 def reproduce(config: ReproduceConfig) -> None:
-    """Regenerate the paper's figures and table, and check its claims in numbers."""
-    from agents.reproduce import reproduce as run
+    """Reproduce the paper's figures and table, and check its claims."""
+    from agents.paper import reproduce
 
-    for claim in run(config.out):
+    for claim in reproduce.reproduce(config.out):
         print(f"{'holds' if claim.holds else 'DOES NOT HOLD'}: {claim.sentence}\n    {claim.found}")
     print(f"Written: {config.out}/paper.json, {config.out}/paper.png")
-
-
-def run() -> None:
-    """Read the command line and do what it says."""
-    command: Any = tyro.cli(
-        Command, prog="ccr-gym", config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes)
-    )
-    COMMANDS[type(command)](command)
-
-
-COMMANDS: dict[type, Any] = {
-    TrainConfig: train,
-    EvaluateConfig: evaluate,
-    RetrainConfig: retrain,
-    SweepConfig: sweep,
-    BenchConfig: bench,
-    ReproduceConfig: reproduce,
-}

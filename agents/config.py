@@ -1,10 +1,10 @@
-"""What the commands are told."""
+"""Settings of the commands: dataclasses that are checked when they are made, and are the command line's help."""
 
 import json
 import math
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import tyro
 
@@ -13,12 +13,12 @@ from agents.files import write_text
 from agents.tuned import LEARNERS, DistilledSettings, LearnerSettings, PPOSettings, RecurrentPPOSettings, SACSettings
 from ccr_gym import ENV_IDS
 
-VALIDATION_SEED = 900_000  # training seeds stay below; learning curves are of seeds from here on
+VALIDATION_SEED = 900_000  # training seeds lie below; learning curves use the seeds from here on
 VALIDATION_EPISODES = 64
-CURVE_POINTS = 15  # of a run
-EVALUATION_SEED = 1_000_000  # evaluation seeds begin here
+CURVE_POINTS = 15  # of a training run
+EVALUATION_SEED = 1_000_000  # first seed of an evaluation
 
-RANGES = {  # of settings of learners that are no counts
+RANGES = {  # of the real-valued settings of learners
     "gamma": (0.0, 1.0),
     "gae_lambda": (0.0, 1.0),
     "tau": (0.0, 1.0),
@@ -40,53 +40,53 @@ Learner = (
 
 @dataclass(frozen=True, slots=True)
 class TrainConfig:
-    """Train a policy on an environment, or go on with a run that was interrupted."""
+    """Train a policy on an environment, or resume an interrupted run."""
 
     run: Path = Path("runs/ppo")
-    """Folder for actor, configuration, checkpoints, learning curve and TensorBoard log."""
+    """Run folder: receives the actor, its configuration, the latest checkpoint and the TensorBoard log."""
     env_id: str = "CCR/PushObstacle-v0"
     """Environment to train on."""
     sensing: Literal["ideal", "realistic"] = "realistic"
-    """What stands between robot and learner: nothing, or backlash, latency, noise and what is unknown."""
+    """Sensors and motors: perfect, or with backlash, latency, noise and unknown rigidity."""
     seed: int = 0
     """Seed of the learner and of the first environment's scenes; below 900 000, where validation begins."""
     threads: int = 2
-    """Threads of the solver; results do not depend on them."""
+    """Threads of the solver; results do not depend on their number."""
     restart: bool = False
-    """Begin again: what this run has written so far is deleted, and nothing else."""
+    """Start again from the beginning; deletes what this run has written so far, and nothing else."""
     learner: Annotated[Learner, tyro.conf.arg(name="")] = field(default_factory=PPOSettings)
     """The learner and its settings."""
 
     def __post_init__(self) -> None:
-        learner = self.learner
-        _known("env_id", (self.env_id,), tuple(ENV_IDS))
-        _known("sensing", (self.sensing,), ("ideal", "realistic"))
-        _positive(self, "threads")
-        _check_learner(learner)
-        if not 0 <= self.seed <= VALIDATION_SEED - learner.envs:
-            raise ValueError(f"seed is {self.seed}; it must be from 0 to {VALIDATION_SEED - learner.envs}")
+        _check_choice("env_id", self.env_id, tuple(ENV_IDS))
+        _check_choice("sensing", self.sensing, ("ideal", "realistic"))
+        _check_counts(self, "threads")
+        _check_learner(self.learner)
+        last = VALIDATION_SEED - self.learner.envs
+        if not 0 <= self.seed <= last:
+            raise ValueError(f"seed is {self.seed}; it must be from 0 to {last}, so that validation scenes stay unseen")
 
     def matches(self, other: "TrainConfig") -> bool:
-        """Whether both make the same policy, wherever and on however many threads."""
+        """Return whether both configurations train the same policy, in whatever folder and on however many threads."""
         return replace(self, run=other.run, threads=other.threads, restart=other.restart) == other
 
     def dumps(self) -> str:
-        """As JSON."""
+        """Return the configuration as JSON."""
         learner = {"name": self.learner.name, **asdict(self.learner)}
         values = {**asdict(self), "run": str(self.run), "learner": learner}
         del values["restart"]
         return json.dumps(values, indent=2)
 
     def save(self, path: Path) -> None:
-        """Write as JSON."""
+        """Write the configuration to a JSON file."""
         write_text(path, self.dumps() + "\n")
 
     @classmethod
     def loads(cls, text: str) -> "TrainConfig":
-        """Read what :meth:`dumps` gave.
+        """Return a configuration from the JSON of :meth:`dumps`.
 
         Raises:
-            ValueError: If it is something else.
+            ValueError: If the text is anything else.
         """
         try:
             values = json.loads(text)
@@ -94,14 +94,14 @@ class TrainConfig:
             learner = LEARNERS[settings.pop("name")](**settings)
             return cls(**values | {"run": Path(values["run"]), "learner": learner})
         except (ValueError, LookupError, TypeError, RecursionError) as error:
-            raise ValueError(f"it is not the configuration of a training run: {error!r}") from error
+            raise ValueError(f"not the configuration of a training run: {error!r}") from error
 
     @classmethod
     def load(cls, path: Path) -> "TrainConfig":
-        """Read what :meth:`save` wrote.
+        """Return a configuration from the file of :meth:`save`.
 
         Raises:
-            UserError: If it is something else.
+            UserError: If the file holds anything else.
         """
         try:
             return cls.loads(path.read_text())
@@ -111,117 +111,128 @@ class TrainConfig:
 
 @dataclass(frozen=True, slots=True)
 class RetrainConfig:
-    """Train every learned baseline on every environment, as the shipped policies were."""
+    """Train every learned baseline on every environment, as the policies in the package were."""
 
     out: Path = Path("runs/retrain")
-    """Folder for the runs; those that are there are not trained again, and interrupted ones go on."""
+    """Folder for the runs; finished ones are kept, interrupted ones are resumed."""
     learners: tuple[str, ...] = tuple(LEARNERS)
-    """Which learners."""
+    """Learners to train."""
     env_ids: tuple[str, ...] = tuple(ENV_IDS)
-    """Which environments."""
+    """Environments to train on."""
     seeds: int = 5
-    """Training seeds of each."""
+    """Training seeds for every learner and environment."""
     share: float = 1.0
-    """Share of the tuned number of steps: less for a quick look."""
+    """Share of the tuned number of steps; less than 1 for a quick look."""
     jobs: int = 2
-    """Runs side by side, each on one thread."""
+    """Runs in parallel, on one thread each."""
 
     def __post_init__(self) -> None:
-        _known("learners", self.learners, tuple(LEARNERS))
-        _known("env_ids", self.env_ids, tuple(ENV_IDS))
+        _check_names("learners", self.learners, tuple(LEARNERS))
+        _check_names("env_ids", self.env_ids, tuple(ENV_IDS))
         if not 0 < self.share <= 1:
             raise ValueError(f"share is {self.share}; it must be above 0 and at most 1")
-        _positive(self, "seeds", "jobs")
+        _check_counts(self, "seeds", "jobs")
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluateConfig:
-    """Evaluate policies on test scenes they were never trained or tuned on: table, figures, videos, JSON."""
+    """Evaluate policies on test scenes that no training or tuning has used: tables, figures, videos and JSON."""
 
     out: Path = Path("runs/evaluation")
     """Folder for the results."""
     runs: tuple[Path, ...] = ()
-    """Folders of training runs, evaluated on their own environments in the place of the shipped policies."""
+    """Run folders of trained policies, evaluated on their own environments instead of those in `pretrained`."""
     pretrained: Path = PRETRAINED
-    """Folder of trained policies, as `ccr-gym retrain` fills it; by default those that come with the package."""
+    """Folder of trained policies, as `ccr-gym retrain` writes it; by default those in the package."""
     env_ids: tuple[str, ...] = tuple(ENV_IDS)
-    """Which environments, where no runs are given."""
+    """Environments to evaluate on, unless `runs` are given."""
     policies: tuple[str, ...] = POLICIES
-    """Which policies; learners are the shipped ones, or those of the runs."""
+    """Policies to evaluate; the learned ones come from `pretrained`, or from `runs`."""
     episodes: int = 100
-    """Episodes of every policy and environment, the same scenes for all."""
+    """Episodes per policy and environment; all policies play the same scenes."""
     seed: int = EVALUATION_SEED
-    """Seed of the first evaluation scene; at least 1 000 000, beyond those of training."""
+    """Seed of the first test scene; at least 1 000 000, beyond the seeds of training."""
     video: bool = True
-    """Whether to render an episode of every policy and environment to a video."""
+    """Record one episode of every policy and environment to a video."""
     jobs: int = 2
-    """Processes."""
+    """Processes in parallel."""
 
     def __post_init__(self) -> None:
-        _known("env_ids", self.env_ids, tuple(ENV_IDS))
-        _known("policies", self.policies, POLICIES)
-        _positive(self, "episodes", "jobs")
+        _check_names("env_ids", self.env_ids, tuple(ENV_IDS))
+        _check_names("policies", self.policies, POLICIES)
+        _check_counts(self, "episodes", "jobs")
         if self.seed < EVALUATION_SEED:
             raise ValueError(f"seed is {self.seed}; it must be at least {EVALUATION_SEED}, beyond the training seeds")
 
 
 @dataclass(frozen=True, slots=True)
 class SweepConfig:
-    """Search settings of a controller or a learner on training scenes, with Optuna."""
+    """Tune a controller or a learner on training scenes with Optuna."""
 
     what: Literal["P", "PI", "MPC", "Newton", "PPO", "SAC", "RecurrentPPO", "Distilled"] = "PI"
-    """Whose settings."""
+    """Controller or learner to tune."""
     env_id: str = "CCR/PushObstacle-v0"
-    """On which environment."""
+    """Environment to tune it on."""
     trials: int = 50
     """Trials to add to the study."""
     episodes: int = 48
-    """Episodes a trial is judged by."""
+    """Episodes that score a trial."""
     steps: int = 300_000
-    """Environment steps a learner is trained for in a trial."""
+    """Environment steps that a learner trains for in a trial."""
     out: Path = Path("runs/sweep")
-    """Folder for the study, which goes on where it was left."""
+    """Folder for the study; an existing study is resumed."""
 
     def __post_init__(self) -> None:
-        _known("env_id", (self.env_id,), tuple(ENV_IDS))
-        _positive(self, "trials", "episodes", "steps")
+        _check_choice("env_id", self.env_id, tuple(ENV_IDS))
+        _check_counts(self, "trials", "episodes", "steps")
 
 
 @dataclass(frozen=True, slots=True)
 class BenchConfig:
-    """Measure the kernel, the environments and a learner on them, beside peers in the same run."""
+    """Measure the speed of the kernel, the environments and learning, next to other tools in the same run."""
 
     steps: int = 200_000
-    """Steps of the contact mix, in thousands: 100 or 200 a scene."""
+    """Steps of the contact mix; a multiple of 1000, as a scene takes 100 or 200."""
     rivals: int = 200
-    """Of these, how many IPOPT repeats."""
+    """How many of these steps IPOPT repeats."""
     seeds: int = 1
-    """Seeds that PPO is trained with."""
+    """Seeds to train PPO with."""
     json: Path | None = Path("runs/bench.json")
-    """File the numbers are written to."""
+    """File for the results."""
 
     def __post_init__(self) -> None:
-        _positive(self, "rivals", "seeds")
+        _check_counts(self, "rivals", "seeds")
         if self.steps < 1000 or self.steps % 1000:
-            raise ValueError(f"steps is {self.steps}; it must be at least 1000, and a multiple of it")
+            raise ValueError(f"steps is {self.steps}; it must be a multiple of 1000, at least 1000")
 
 
 @dataclass(frozen=True, slots=True)
 class ReproduceConfig:
-    """Regenerate the paper's figures and table, and check its claims in numbers."""
+    """Reproduce the paper's figures and table, and check its claims in numbers."""
 
     out: Path = Path("runs/paper")
     """Folder for paper.png and paper.json."""
 
 
-def _known(name: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:
-    unknown = [value for value in given if value not in known]
-    if unknown or not given:
-        raise ValueError(f"{name} is {list(given)}; it must name some of {', '.join(known)}")
+def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ValueError(f"{field} is {value!r}; it must be one of {', '.join(choices)}")
+
+
+def _check_names(field: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
+    if not names or not set(names) <= set(known):
+        raise ValueError(f"{field} is {list(names)}; it must name some of {', '.join(known)}")
+
+
+def _check_counts(settings: object, *fields: str) -> None:
+    for name in fields:
+        value = getattr(settings, name)
+        if value < 1:
+            raise ValueError(f"{name} is {value}; it must be at least 1")
 
 
 def _check_learner(learner: LearnerSettings) -> None:
-    """Raise ``ValueError`` where a setting is of another type than its default, or out of its range."""
+    """Refuse settings of another type than their defaults, or out of range."""
     for name, value in asdict(learner).items():
         kind = type(getattr(type(learner)(), name))
         if not isinstance(value, (int, kind)):
@@ -229,13 +240,16 @@ def _check_learner(learner: LearnerSettings) -> None:
         low, high = RANGES.get(name, (-math.inf, math.inf))
         if not (math.isfinite(value) and low <= value <= high):
             raise ValueError(f"{name} is {value}; it must be from {low} to {high}")
-    _positive(learner, *(name for name, value in asdict(type(learner)()).items() if isinstance(value, int)))
-    if getattr(learner, "epochs", 0) and min(learner.batch_size, learner.envs * getattr(learner, "rollout", 1)) < 2:
-        raise ValueError("batch_size and envs times rollout must be at least 2: advantages are scaled by their spread")
+    _check_counts(learner, *(name for name, value in asdict(type(learner)()).items() if isinstance(value, int)))
+    _check_batch(learner)
 
 
-def _positive(settings: Any, *names: str) -> None:
-    for name in names:
-        value = getattr(settings, name)
-        if value < 1:
-            raise ValueError(f"{name} is {value}; it must be at least 1")
+def _check_batch(learner: LearnerSettings) -> None:
+    """Refuse batches of one sample where advantages are divided by their standard deviation."""
+    if isinstance(learner, PPOSettings | RecurrentPPOSettings):
+        samples = learner.envs * learner.rollout
+        if min(learner.batch_size, samples) < 2:
+            raise ValueError(
+                f"batch_size is {learner.batch_size} and envs times rollout is {samples}; both must be at least 2, as "
+                "advantages are divided by their standard deviation"
+            )

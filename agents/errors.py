@@ -1,5 +1,5 @@
-"""What the user of a command can mend."""
+"""Errors that the user of a command can correct."""
 
 
 class UserError(ValueError):
-    """Shown by the ``ccr-gym`` command as one line without a traceback: says what is wrong and what to do."""
+    """Reported by the ``ccr-gym`` command in one line without a traceback: what is wrong, and the remedy."""

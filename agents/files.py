@@ -1,23 +1,25 @@
-"""Files that are there whole or not at all."""
+"""Files that are either written completely or not at all, and locks on folders."""
 
 import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from agents.errors import UserError
 
-PARTIAL = ".partial-"  # before the name of a file that is being written
+JsonObject = dict[str, Any]  # its reader checks what it needs of the values
+PARTIAL = ".partial-"  # prefix of a file while it is being written
 LOCK = ".lock"
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path to write to, with the same suffix; what is written takes the file's place once it is on the disk.
+    """Yield a temporary path with the same suffix, whose file replaces ``path`` once it is on the disk.
 
     Raises:
-        UserError: If it cannot be written; the file is then as it was.
+        UserError: If the file cannot be written; ``path`` is then unchanged.
     """
     partial = path.with_name(PARTIAL + path.name)
     try:
@@ -32,7 +34,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, all of it or nothing.
+    """Write a text file, either completely or not at all.
 
     Raises:
         UserError: If it cannot be written.
@@ -43,14 +45,16 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other processes out of a folder; the lock ends with the process, however that ends.
+    """Keep other processes out of a folder; the lock is released when the process ends, even if it is killed.
 
     Raises:
-        UserError: If another process has it.
+        UserError: If another process holds the lock.
     """
     with (folder / LOCK).open("a") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise UserError(f"another process is training in {folder}; wait for it, or give another folder") from error
+            raise UserError(
+                f"another process is training in {folder}; wait until it ends, or choose another folder"
+            ) from error
         yield

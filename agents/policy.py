@@ -1,33 +1,34 @@
-"""The contract of everything that acts."""
+"""The interface of a policy, and what controllers and teachers have in common."""
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from agents.environment import Environment, Observation
 from ccr_gym import AHEAD, FORCE_SCALE_N, PrivilegedState
 
-Observation = dict[str, np.ndarray]
+__all__ = ["Observation", "Policy", "motor_actions", "search", "set_points"]
 
 
 class Policy(Protocol):
-    """Acts on dictionary observations (`obs_mode="dict"`)."""
+    """Chooses actions from dictionary observations (``obs_mode="dict"``)."""
 
     name: str
 
-    def reset(self, env: Any = None) -> None:
-        """Forget the episode; a controller that knows more than it sees is given the environment of the next one."""
+    def reset(self, env: Environment | None = None) -> None:
+        """Start a new episode; a controller that uses more than its observations takes it from the environment."""
 
     def act(self, observation: Observation) -> np.ndarray:
-        """The action for an observation, ``(1,)``, in space ``(2,)``, in [−1, 1]."""
+        """Return the action for an observation: ``(1,)``, or ``(2,)`` in space and with insertion, in [−1, 1]."""
 
 
 def search(observation: Observation) -> np.ndarray:
-    """The full action that bends the robot towards the obstacle, ``(..., actions)``: in the plane there is one way.
+    """Return the full-speed action that bends the robot towards the obstacle, ``(..., actions)``.
 
-    In space the cables are taken to be at right angles.
+    In the plane there is only one direction. In space the two pairs of cables are assumed to be at right angles.
 
     Args:
-        observation: What is seen, of one robot or of many.
+        observation: The observation of one robot, or of many.
     """
     many = observation["desired_force"].shape[:-1]
     if "length" in observation:
@@ -40,39 +41,23 @@ def search(observation: Observation) -> np.ndarray:
 
 
 def set_points(observation: Observation, steps: int) -> np.ndarray:
-    """Magnitudes of the set-points after the next steps, ``(steps,)`` [N]: as now, unless they are previewed."""
+    """Return the set-point magnitudes after each of the next steps, ``(steps,)`` [N].
+
+    They are interpolated between the previewed ones; without a preview the present set-point is held.
+    """
     now = float(np.linalg.norm(observation["desired_force"]))
     ahead = observation.get("desired_ahead", np.full(len(AHEAD), now))
     return np.asarray(FORCE_SCALE_N * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
 
 
-def effort(moves: np.ndarray, truth: PrivilegedState, increments: np.ndarray) -> np.ndarray:
-    """Actions, ``(..., actions)``, for moves of what motors with play move [mm]: the play is taken up as well.
+def motor_actions(moves: np.ndarray, state: PrivilegedState, increments: np.ndarray) -> np.ndarray:
+    """Return the actions ``(..., actions)`` that move the cables and the base as wanted, backlash included.
 
     Args:
         moves: Wanted moves, ``(..., actions)`` [mm]; where one is zero the motor stays.
-        truth: Places, motors and slack.
-        increments: What full actions move, ``(actions,)`` [mm].
+        state: Actuated positions, motor positions and backlash.
+        increments: Moves of full actions, ``(actions,)`` [mm].
     """
-    play = np.where(moves == 0, 0.0, truth.places + np.copysign(truth.slack, moves) - truth.motors)
+    play = np.where(moves == 0, 0.0, state.actuated_mm + np.copysign(state.half_backlash_mm, moves) - state.motor_mm)
     wanted = (moves + play) / increments
     return np.asarray(wanted / np.maximum(1.0, np.abs(wanted).max(axis=-1, keepdims=True)), np.float32)
-
-
-class Tare:
-    """The force sensor with its zero taken off: the mean of what it reads while nothing touches."""
-
-    def __init__(self) -> None:
-        self._readings: list[np.ndarray] = []
-
-    def forget(self) -> None:
-        """Begin a new episode."""
-        self._readings.clear()
-
-    def force(self, observation: Observation) -> np.ndarray | None:
-        """The measured force, ``(d,)`` [N]; ``None`` while nothing is seen to touch, which tells the zero."""
-        measured = FORCE_SCALE_N * observation["force_measured"].astype(float)
-        if not observation["contact"].any():
-            self._readings.append(measured)
-            return None
-        return measured - np.mean(self._readings, axis=0) if self._readings else measured

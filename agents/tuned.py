@@ -1,9 +1,9 @@
-"""Settings that were tuned on training scenes, with realistic sensing unless it is said."""
+"""Settings of controllers and learners, tuned on training scenes with realistic sensing (``ccr-gym sweep``)."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-PI_GAINS = {  # action per newton of change of the force error, and of force error
+PI_GAINS = {  # action per newton of change in the force error; action per newton of force error
     "CCR/LoadCell-v0": (38.9, 28.9),
     "CCR/PushObstacle-v0": (15.7, 10.5),
     "CCR/TrackForce-v0": (26.0, 10.7),
@@ -21,27 +21,27 @@ P_GAINS = {  # action per newton of force error
     "CCR/InsertAndPush-v0": 2.3,
     "CCR/SpatialPush-v0": 9.2,
 }
-NEWTON_GAIN = 0.8  # part of a Newton step
+NEWTON_GAIN = 0.8  # share of a Newton step
 
 
 @dataclass(frozen=True, slots=True)
 class MPCSettings:
-    """Of the model-predictive controller."""
+    """Settings of the model-predictive controller."""
 
     horizon: int = 8
-    """Steps planned."""
+    """Steps of a plan."""
     effort: float = 0.05
-    """Weight of squared moves, over that of the squared force they add."""
+    """Weight of the squared force change of each move, relative to the squared force errors."""
     slope: float = 0.03
-    """Force per millimetre of cable that is assumed at first [N/mm]."""
+    """Slope of the force over the cable that is assumed at first [N/mm]."""
     least_slope: float = 0.005
-    """Smallest slope that is believed [N/mm]."""
+    """Smallest slope that is used [N/mm]."""
     trust: float = 0.05
-    """Squared moves that the assumed slope is worth [mm²]."""
+    """Weight of the assumed slope in the fit, as a squared distance [mm²]."""
     stiffening: float = 0.4
-    """Rate at which the slope is assumed to grow with the cable [1/mm]."""
+    """Relative growth of the slope per millimetre of cable [1/mm]."""
     width_mm: float = 0.6
-    """Distance from a reading within which it counts [mm]."""
+    """Standard deviation of the weight of a reading over its distance [mm]."""
 
 
 MPC = {
@@ -71,14 +71,14 @@ MPC = {
 
 @dataclass(frozen=True, slots=True)
 class OnPolicySettings:
-    """What both kinds of proximal policy optimisation are told."""
+    """Settings of both kinds of proximal policy optimisation."""
 
     name: ClassVar[str]
 
     steps: int = 600_000
     """Environment steps to train for."""
     envs: int = 64
-    """Environments stepped side by side."""
+    """Environments stepped in parallel."""
     rollout: int = 128
     """Steps of each environment between updates."""
     batch_size: int = 2048
@@ -86,30 +86,30 @@ class OnPolicySettings:
     epochs: int = 8
     """Passes over a rollout."""
     learning_rate: float = 1e-3
-    """Of Adam, decaying linearly to zero."""
+    """Learning rate of Adam; decays linearly to zero."""
     gamma: float = 0.9
-    """Discount of rewards."""
+    """Discount factor of rewards."""
     gae_lambda: float = 0.9
-    """Decay of advantages."""
+    """Decay λ of generalised advantages."""
     log_std_init: float = -0.5
-    """Logarithm of the first exploration noise."""
+    """Logarithm of the initial standard deviation of actions."""
     width: int = 64
-    """Units in each hidden layer: two, or one behind an LSTM."""
+    """Units per hidden layer: two layers, or one after an LSTM."""
 
 
 @dataclass(frozen=True, slots=True)
 class PPOSettings(OnPolicySettings):
-    """Proximal policy optimisation, on observations with a memory."""
+    """Proximal policy optimisation (PPO) on observations with a memory."""
 
     name: ClassVar[str] = "PPO"
 
 
-PPO_IDEAL = PPOSettings(steps=160_000, envs=32, rollout=64, batch_size=512)  # enough where sensing is ideal
+PPO_IDEAL = PPOSettings(steps=160_000, envs=32, rollout=64, batch_size=512)  # sufficient with ideal sensing
 
 
 @dataclass(frozen=True, slots=True)
 class RecurrentPPOSettings(OnPolicySettings):
-    """Proximal policy optimisation with an LSTM in the place of the memory."""
+    """Proximal policy optimisation with an LSTM instead of the memory."""
 
     name: ClassVar[str] = "RecurrentPPO"
 
@@ -125,54 +125,54 @@ class RecurrentPPOSettings(OnPolicySettings):
 
 @dataclass(frozen=True, slots=True)
 class SACSettings:
-    """Soft actor-critic, on observations with a memory."""
+    """Soft actor-critic (SAC) on observations with a memory."""
 
     name: ClassVar[str] = "SAC"
 
     steps: int = 100_000
     """Environment steps to train for."""
     envs: int = 32
-    """Environments stepped side by side."""
+    """Environments stepped in parallel."""
     gradient_steps: int = 4
-    """Gradient steps for one step of all environments."""
+    """Gradient steps after each step of all environments."""
     batch_size: int = 256
     """Samples of one gradient step."""
     learning_rate: float = 1e-3
-    """Of Adam, decaying linearly to zero."""
+    """Learning rate of Adam; decays linearly to zero."""
     gamma: float = 0.9
-    """Discount of rewards."""
+    """Discount factor of rewards."""
     tau: float = 0.01
-    """Share of the target networks that is renewed by a gradient step."""
+    """Share of the critics that a gradient step blends into the target networks."""
     buffer: int = 100_000
-    """Steps that are kept."""
+    """Environment steps in the replay buffer."""
     width: int = 64
-    """Units in each of the two hidden layers of the policy; the critics have twice as many."""
+    """Units per hidden layer of the policy (two layers); the critics have twice as many."""
 
 
 @dataclass(frozen=True, slots=True)
 class DistilledSettings:
-    """Imitation of a teacher that knows what is hidden, on observations with a memory (DAgger)."""
+    """Imitation (DAgger) of a teacher that sees the hidden state, on observations with a memory."""
 
     name: ClassVar[str] = "Distilled"
 
     steps: int = 400_000
     """Environment steps to train for."""
     envs: int = 128
-    """Environments stepped side by side."""
+    """Environments stepped in parallel."""
     rollout: int = 64
-    """Steps of each environment between rounds of learning."""
+    """Steps of each environment per round."""
     gradient_steps: int = 400
-    """Gradient steps of a round."""
+    """Gradient steps per round."""
     batch_size: int = 1024
-    """Samples of one gradient step, of all rounds so far."""
+    """Samples of one gradient step, from all rounds so far."""
     learning_rate: float = 2e-3
-    """Of Adam, decaying linearly to zero."""
+    """Learning rate of Adam; decays linearly to zero."""
     weaning: int = 5
-    """Rounds in which the teacher still acts in some of the environments, fewer and fewer."""
+    """Rounds over which the share of environments that the teacher drives falls to zero."""
     huber: float = 0.1
-    """Error of an action beyond which the loss grows linearly."""
+    """Action error beyond which the loss is linear."""
     width: int = 64
-    """Units in each of the two hidden layers."""
+    """Units per hidden layer (two layers)."""
 
 
 LearnerSettings = PPOSettings | RecurrentPPOSettings | SACSettings | DistilledSettings

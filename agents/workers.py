@@ -1,4 +1,4 @@
-"""Processes that work side by side."""
+"""Worker processes."""
 
 import multiprocessing
 import os
@@ -12,17 +12,18 @@ from agents.errors import UserError
 
 
 @contextmanager
-def workers(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes of one thread each: small matrices are solved faster so, and far faster where all cores are taken.
+def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of single-threaded processes, which are killed if the block fails or is interrupted.
 
-    An interrupt is left to this process, which then ends them, whatever they are at.
+    One thread each is fastest for small matrices, and by far where every core has a process of its own. The workers
+    ignore interrupts; this process handles them.
 
     Raises:
         UserError: If one of them dies.
     """
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")  # read when the libraries are loaded, in new processes
-    context = multiprocessing.get_context("spawn")  # torch does not bear being forked
+    context = multiprocessing.get_context("spawn")  # torch does not survive a fork
     others = multiprocessing.active_children()
     pool = ProcessPoolExecutor(count, mp_context=context)
     try:
@@ -32,14 +33,14 @@ def workers(count: int) -> Iterator[ProcessPoolExecutor]:
         for process in set(multiprocessing.active_children()) - set(others):
             process.kill()
         if isinstance(error, BrokenProcessPool):
-            raise UserError("a worker process was killed, as where memory runs out; try fewer --jobs") from error
+            raise UserError("a worker process was killed, perhaps for lack of memory; try fewer --jobs") from error
         raise
     finally:
         pool.shutdown(cancel_futures=True)
 
 
 def _start(pool: ProcessPoolExecutor, count: int) -> None:
-    """Start all processes now, as a process keeps the blocked signals of the thread that starts it."""
+    """Start all processes now, while SIGINT is blocked: they inherit the mask of the thread that starts them."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     for _ in range(count):
         pool.submit(int)

@@ -1,6 +1,6 @@
-"""Count the instructions of the kernel on fixed replays of the contact mixes, which do not depend on the load.
+"""Count the instructions of the kernel on fixed replays of the contact mixes; unlike times, they are reproducible.
 
-Needs valgrind. ``python benchmarks/instructions.py`` compares with ``instructions.json``; ``--update`` writes it anew.
+Needs valgrind. ``python benchmarks/instructions.py`` compares with ``instructions.json``; ``--update`` rewrites it.
 """
 
 import argparse
@@ -29,7 +29,7 @@ STEPS = 2000
 
 
 def planar(model: str) -> list[PlanarStep]:
-    """The contact mix of the plane with one model of the robot."""
+    """Return the planar contact mix with one model of the robot."""
     return list(contact_mix(STEPS, robot=replace(Robot.prototype(), model=model)))
 
 
@@ -42,7 +42,7 @@ MIXES: dict[str, Callable[[], Steps]] = {
 
 
 def write(steps: Steps, path: Path) -> None:
-    """The recording that replay.cpp reads: numbers all, counts among them."""
+    """Write the recording that replay.cpp reads, counts included, as one array of numbers."""
     robot = steps[0].solver.robot
     in_space = not isinstance(robot, Robot)
     sliding = not in_space and robot.model == "rod"
@@ -60,11 +60,11 @@ def write(steps: Steps, path: Path) -> None:
 
 
 def build(folder: Path) -> Path:
-    """The replay, compiled as the kernel is."""
-    places = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    cmake = shutil.which("cmake", path=places)
+    """Build the replay with the compiler flags of the kernel; return the path of the program."""
+    search_path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    cmake = shutil.which("cmake", path=search_path)
     if cmake is None:
-        raise SystemExit("cmake is not there; install it (pip install cmake) to build the replay")
+        raise SystemExit("cmake not found; the replay is built with it: pip install cmake")
     configure = [cmake, "-S", HERE, "-B", folder, f"-DPython_EXECUTABLE={sys.executable}"]
     for command in (configure, [cmake, "--build", folder, "--parallel"]):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -72,7 +72,7 @@ def build(folder: Path) -> Path:
 
 
 def count(program: Path, recording: Path) -> float:
-    """Instructions of a step."""
+    """Return the instructions per step."""
     command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={recording}.out", program, recording]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     refs = re.search(r"refs:\s+([\d,]+)", done.stderr)
@@ -81,12 +81,12 @@ def count(program: Path, recording: Path) -> float:
 
 
 def main() -> None:
-    """Count, compare, and write where that is asked for."""
+    """Count the instructions, compare them with those on record, and update the record if asked to."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--update", action="store_true")
     arguments = parser.parse_args()
     if not shutil.which("valgrind"):
-        raise SystemExit("valgrind is not there; install it to count instructions")
+        raise SystemExit("valgrind not found; it counts the instructions: apt-get install valgrind")
     found = {}
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -98,7 +98,7 @@ def main() -> None:
     for name, instructions in found.items():
         recorded = before.get(name)
         change = f", {instructions / recorded - 1:+.1%} against {recorded:,} recorded" if recorded else ""
-        print(f"{name}: {instructions:,} instructions a step, reading the recording included{change}")
+        print(f"{name}: {instructions:,} instructions per step, including reading the recording{change}")
     if arguments.update:
         RECORDED.write_text(json.dumps(found, indent=2) + "\n")
 

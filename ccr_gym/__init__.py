@@ -1,13 +1,30 @@
-"""Gymnasium environments for contact-aware control of a cable-driven continuum robot; importing registers them."""
+"""Gymnasium environments for contact-aware control of a cable-driven continuum robot; importing it registers them."""
 
-from ccr_gym.env import ContactEnv
+from ccr_gym.imports import check_kernel, check_packages
+
+# ruff: noqa: E402 - the checks come before what they check
+check_packages("solver")
+check_kernel()
+
+from ccr_gym.actions import ActionSpec
+from ccr_gym.contact_env import ContactEnv
+from ccr_gym.envs import (
+    BracedPushEnv,
+    InsertAndPushEnv,
+    LoadCellEnv,
+    PushObstacleEnv,
+    SoftObstacleEnv,
+    SpatialPushEnv,
+    TrackForceEnv,
+)
 from ccr_gym.episodes import PrivilegedState
-from ccr_gym.observation import AHEAD, FORCE_SCALE_N
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
+from ccr_gym.scales import AHEAD, FORCE_SCALE_N
 from ccr_gym.sensing import Sensing
 from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
 from ccr_gym.tasks import (
+    Assignment,
     BracedPush,
     InsertAndPush,
     LoadCell,
@@ -17,28 +34,40 @@ from ccr_gym.tasks import (
     Task,
     TrackForce,
 )
-from ccr_gym.vector_env import ContactVectorEnv
+from ccr_gym.vector_env import ContactVectorEnv, make_vector_env
 
 __all__ = [
     "AHEAD",
     "ENV_IDS",
     "FORCE_SCALE_N",
+    "ActionSpec",
+    "Assignment",
     "BracedPush",
+    "BracedPushEnv",
     "ContactEnv",
     "ContactVectorEnv",
     "InsertAndPush",
+    "InsertAndPushEnv",
     "InsertionSettings",
     "LoadCell",
+    "LoadCellEnv",
     "PrivilegedState",
     "PushObstacle",
+    "PushObstacleEnv",
     "RewardWeights",
     "Sensing",
     "Settings",
     "SoftObstacle",
+    "SoftObstacleEnv",
     "SpatialPush",
+    "SpatialPushEnv",
     "SpatialSettings",
     "Task",
     "TrackForce",
+    "TrackForceEnv",
+    "check_packages",
+    "make_vector_env",
+    "register_envs",
 ]
 __version__ = "0.1.0"
 

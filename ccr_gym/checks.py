@@ -1,12 +1,12 @@
-"""Refusals at the boundary: every message names the field, its value and what it must be.
+"""Validation of what users pass to environments; every message names the field, its value and the bound.
 
-A value that a field cannot have is a ValueError, whatever its type; an object of another class, or a name that there is
-not, is a TypeError.
+An invalid value raises ValueError, whatever its type. An object of the wrong class, or an unknown name, raises
+TypeError.
 
-A dataclass declares the check of a field beside its default, and runs all of them when it is made::
+Dataclasses declare the check of a field beside its default and run all checks when they are made::
 
     @dataclass(frozen=True, slots=True)
-    class MyTask(Task):
+    class MyTask(Task[Robot]):
         radius_mm: tuple[float, float] = checked((10.0, 16.0), check_range, low=SMALLEST)
 """
 
@@ -14,49 +14,64 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
-from typing import Any
+from types import UnionType
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from solver.common.validation import LARGEST, is_listed, is_real, is_whole, shown
+from solver.common import validation
+from solver.common.validation import LARGEST, is_real, is_whole, shown
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T")
+DataclassT = TypeVar("DataclassT", bound="DataclassInstance")
 
 
 def require(condition: bool, message: str) -> None:
-    """Refuse what does not meet a condition.
+    """Raise an error with this message unless the condition holds.
 
     Raises:
-        ValueError: With the message.
+        ValueError: If it does not hold.
     """
     if not condition:
         raise ValueError(message)
 
 
-def checked(default: Any, check: Callable[..., Any], /, **bounds: Any) -> Any:
-    """Declare a dataclass field together with its check, which :func:`check_fields` runs.
+def refusal(name: str, value: object, bound: str, kind: type[Exception] = ValueError) -> Exception:
+    """Return the exception that states a value and what it must be."""
+    return kind(f"{name} is {shown(value)}; it must be {bound}")
+
+
+def checked(default: T, check: Callable[..., object], /, **bounds: object) -> T:
+    """Declare a dataclass field with its check, which :func:`check_fields` runs.
 
     Args:
-        default: The default value, or a function that makes it.
+        default: The default value.
         check: One of the checks below, or any ``check(name, value, **bounds)`` that returns the value to keep.
-        **bounds: Passed to the check.
+        **bounds: Keyword arguments of the check.
     """
-    metadata = {"check": partial(check, **bounds)}
-    if callable(default):
-        return field(default_factory=default, metadata=metadata)
-    return field(default=default, metadata=metadata)
+    return field(default=default, metadata={"check": partial(check, **bounds)})
 
 
-def nested(kind: type[Any], default: Callable[[], Any] | None = None) -> Any:
-    """Declare a dataclass field that is a dataclass itself, or a mapping of its fields, or ``None`` for the default."""
-    default = default or kind
-    return checked(default, check_instance, kind=kind, default=default)
+def nested(kind: type[DataclassT], default: Callable[[], DataclassT] | None = None) -> DataclassT:
+    """Declare a dataclass field that holds a dataclass; a mapping of its fields, or None for the default, is accepted.
+
+    Args:
+        kind: The dataclass.
+        default: Makes the default; ``None`` to call ``kind()``.
+    """
+    make = default or kind
+    return field(default_factory=make, metadata={"check": partial(check_instance, kind=kind, default=make)})
 
 
-def check_fields(instance: Any) -> None:
+def check_fields(instance: "DataclassInstance") -> None:
     """Check the fields of a dataclass that were declared with :func:`checked`, and keep what the checks return.
 
     Raises:
-        TypeError: If a value should be an object of another class.
-        ValueError: If a value is out of its bounds.
+        TypeError: If a value is an object of the wrong class.
+        ValueError: If a value is out of bounds.
     """
     for declared in fields(instance):
         if check := declared.metadata.get("check"):
@@ -65,12 +80,12 @@ def check_fields(instance: Any) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Where a number may lie; never at infinity.
+    """Bounds of a number, always finite.
 
     Attributes:
         low: Smallest value.
         high: Largest value.
-        below: Value that it must stay under, instead of ``high``.
+        below: Exclusive upper bound, instead of ``high``.
         reason: Where the bounds come from, for the message.
     """
 
@@ -79,69 +94,83 @@ class Bounds:
     below: float | None = None
     reason: str = ""
 
-    def __contains__(self, value: Any) -> bool:
-        return self.low <= value <= self.high and (self.below is None or value < self.below)
+    @property
+    def largest(self) -> float:
+        """Largest value, whether ``high`` or ``below`` bounds it."""
+        return self.high if self.below is None else math.nextafter(self.below, self.low)
+
+    def __contains__(self, value: validation.Real) -> bool:
+        return bool(self.low <= value <= self.largest)
 
     def __str__(self) -> str:
-        most = f"{self.high:.10g}" if self.below is None else f"below {self.below:.10g}"
-        return f"from {self.low:.10g} to {most}" + (f" ({self.reason})" if self.reason else "")
+        high = f"{self.high:.10g}" if self.below is None else f"below {self.below:.10g}"
+        return f"from {self.low:.10g} to {high}" + (f" ({self.reason})" if self.reason else "")
 
 
-def check_number(name: str, value: Any, **bounds: Any) -> float:
-    """Return a number as a float.
+def check_number(name: str, value: object, *, low: float = -LARGEST, high: float = LARGEST, reason: str = "") -> float:
+    """Return a real number within bounds as a float.
 
     Args:
-        name: What it is called.
-        value: Any kind of real number, but no bool.
-        **bounds: As :class:`Bounds`.
+        name: Name of the field.
+        value: A Python or numpy number, not a bool.
+        low: Smallest value.
+        high: Largest value.
+        reason: Where the bounds come from, for the message.
 
     Raises:
-        ValueError: If it is no number, out of bounds, or not finite.
+        ValueError: If it is not a number, or out of bounds.
     """
-    limits = Bounds(**bounds)
-    if not (is_real(value) and value in limits):
-        raise refusal(name, value, f"a number {limits}")
-    return float(value)
+    return validation.check_number(name, value, low, high, f"a number {Bounds(low, high, None, reason)}")
 
 
-def check_whole(name: str, value: Any, **bounds: Any) -> int:
-    """Return a whole number as an int; bounds and errors as :func:`check_number`."""
-    limits = Bounds(**bounds)
-    if not (is_whole(value) and value in limits):
-        raise refusal(name, value, f"a whole number {limits}")
-    return int(value)
-
-
-def check_range(name: str, value: Any, *, whole: bool = False, **bounds: Any) -> tuple[Any, Any]:
-    """Return the ends of a range as a tuple of two numbers that do not descend; both may be equal.
+def check_range(
+    name: str,
+    value: object,
+    *,
+    whole: bool = False,
+    low: float = -LARGEST,
+    high: float = LARGEST,
+    below: float | None = None,
+    reason: str = "",
+) -> tuple[float, float]:
+    """Return a range as a tuple of its lower and upper end, which may be equal.
 
     Args:
-        name: What it is called.
+        name: Name of the field.
         value: Two numbers in a tuple, list or array.
-        whole: Whether both must be whole.
-        **bounds: As :class:`Bounds`.
+        whole: Whether both must be whole numbers.
+        low: Smallest value.
+        high: Largest value.
+        below: Exclusive upper bound, instead of ``high``.
+        reason: Where the bounds come from, for the message.
 
     Raises:
-        ValueError: If it is anything else, an end is out of bounds or not finite, or the first exceeds the second.
+        ValueError: If it is not two numbers, an end is out of bounds, or the first exceeds the second.
     """
-    limits, numbers = Bounds(**bounds), "whole numbers" if whole else "numbers"
-    known = is_whole if whole else is_real
-    paired = is_listed(value) and len(value) == 2 and all(map(known, value))
-    if not (paired and all(end in limits for end in value) and value[0] <= value[1]):
-        raise refusal(name, value, f"two {numbers} {limits}, the smaller one first")
-    low, high = map(int if whole else float, value)
-    return low, high
+    bounds, is_number = Bounds(low, high, below, reason), is_whole if whole else is_real
+    wanted = f"two {'whole numbers' if whole else 'numbers'} {bounds}, the smaller one first"
+    entries = validation.check_sequence(name, value, wanted)
+    ends = [end for end in entries if is_number(end) and end in bounds]
+    if not (len(ends) == len(entries) == 2 and ends[0] <= ends[1]):
+        raise refusal(name, value, wanted)
+    first, last = map(int if whole else float, ends)
+    return first, last
 
 
-def check_ranges(name: str, value: Any, *, bounds: Sequence[Mapping[str, Any]]) -> tuple[tuple[Any, Any], ...]:
+def check_ranges(name: str, value: object, *, bounds: Sequence[Mapping[str, float]]) -> tuple[tuple[float, float], ...]:
     """Return several ranges as a tuple, each checked against bounds of its own."""
-    if not (is_listed(value) and len(value) == len(bounds)):
-        raise refusal(name, value, f"{len(bounds)} ranges of two numbers each")
-    return tuple(check_range(f"{name}[{k}]", ends, **bounds[k]) for k, ends in enumerate(value))
+    wanted = f"{len(bounds)} ranges of two numbers each"
+    ranges = validation.check_sequence(name, value, wanted)
+    if len(ranges) != len(bounds):
+        raise refusal(name, value, wanted)
+    return tuple(
+        check_range(f"{name}[{k}]", ends, low=own.get("low", -LARGEST))
+        for k, (ends, own) in enumerate(zip(ranges, bounds, strict=True))
+    )
 
 
-def check_flag(name: str, value: Any) -> bool:
-    """Return a truth value as a bool.
+def check_flag(name: str, value: object) -> bool:
+    """Return a Python or numpy bool as a bool.
 
     Raises:
         ValueError: If it is anything else.
@@ -151,8 +180,8 @@ def check_flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def check_choice(name: str, value: Any, *, choices: Sequence[str]) -> str:
-    """Return a word that is one of some.
+def check_choice(name: str, value: object, *, choices: Sequence[str]) -> str:
+    """Return a string that is one of the choices.
 
     Raises:
         ValueError: If it is none of them.
@@ -162,28 +191,30 @@ def check_choice(name: str, value: Any, *, choices: Sequence[str]) -> str:
     return str(value)
 
 
-def check_type(name: str, value: Any, kind: Any, what: str = "") -> None:
-    """Refuse what is of another type.
+def check_type(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:
+    """Raise an error unless a value is of a type.
 
     Args:
-        name: What it is called.
-        value: Anything.
+        name: Name of the field.
+        value: The value.
         kind: The type, or a union of types.
-        what: What the message says that it must be, if not the type's name.
+        wanted: What the message says it must be; by default the name of the type.
 
     Raises:
-        TypeError: If it is anything else.
+        TypeError: If it is of another type.
     """
     if not isinstance(value, kind):
-        raise refusal(name, value, what or f"a {kind.__name__}", TypeError)
+        raise refusal(name, value, wanted or f"a {getattr(kind, '__name__', kind)}", TypeError)
 
 
-def check_instance(name: str, value: Any, *, kind: type[Any], default: Callable[[], Any] | None = None) -> Any:
-    """Return a dataclass from one, from a mapping of its fields, or the default from ``None`` or an empty mapping.
+def check_instance(
+    name: str, value: object, *, kind: type[DataclassT], default: Callable[[], DataclassT] | None = None
+) -> DataclassT:
+    """Return a dataclass, given as one or as a mapping of its fields; None and ``{}`` stand for the default.
 
     Raises:
-        TypeError: If it is anything else, or the mapping names a field that does not exist.
-        ValueError: As the dataclass.
+        TypeError: If it is anything else, or the mapping has an unknown field.
+        ValueError: If a field is out of bounds.
     """
     if default is not None and (value is None or (isinstance(value, Mapping) and not value)):
         return default()
@@ -191,26 +222,27 @@ def check_instance(name: str, value: Any, *, kind: type[Any], default: Callable[
         check_names(name, value, [declared.name for declared in fields(kind) if declared.init])
         return kind(**value)
     check_type(name, value, kind, f"a {kind.__name__} or a mapping of its fields")
+    assert isinstance(value, kind)
     return value
 
 
-def check_names(name: str, given: Mapping[Any, Any], valid: Sequence[str]) -> None:
-    """Refuse a name that is none of the valid ones.
+def check_names(name: str, given: Mapping[str, object], valid: Sequence[str]) -> None:
+    """Raise an error if a mapping has keys other than the valid names.
 
     Raises:
-        TypeError: Naming it and the valid ones.
+        TypeError: Naming the unknown keys and the valid names.
     """
     unknown = [shown(key) for key in given if not (isinstance(key, str) and key in valid)]
     if unknown:
         raise TypeError(f"{name} does not take {', '.join(unknown)}; it takes {', '.join(valid)}")
 
 
-def check_array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return finite numbers as an array of floats.
+def check_array(name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:
+    """Return finite real numbers as an array of floats.
 
     Raises:
-        ValueError: If they are not real numbers (booleans, complex numbers, strings and objects are not), the shape is
-            another, or one of them is not finite.
+        ValueError: If the shape differs, or an entry is not a finite real number (booleans, complex numbers, strings
+            and objects are not).
     """
     array = as_array(value)
     numeric = array.dtype.kind in "fiu" and array.dtype.itemsize <= 8
@@ -219,33 +251,28 @@ def check_array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     return array.astype(float)
 
 
-def check_seed(name: str, value: Any) -> int | None:
-    """Return a seed as an int; ``None`` stays ``None``.
+def check_seed(name: str, value: object) -> int | None:
+    """Return a seed as an int, or None.
 
     Raises:
-        ValueError: If it is no whole number, or negative.
+        ValueError: If it is neither None nor a whole number from 0 on.
     """
     if value is None:
         return None
-    if not (is_whole(value) and value >= 0):
+    if not (isinstance(value, int | np.integer) and is_whole(value) and value >= 0):
         raise refusal(name, value, "None or a whole number from 0 on")
     return int(value)
 
 
-def refusal(name: str, value: Any, bound: str, kind: type[Exception] = ValueError) -> Exception:
-    """Return the exception that says what a value is, and what it must be."""
-    return kind(f"{name} is {shown(value)}; it must be {bound}")
-
-
-def as_array(value: Any) -> np.ndarray:
-    """Return an array of what has numbers, and one of objects from anything else."""
+def as_array(value: object) -> np.ndarray:
+    """Return a value as an array, or an empty array of objects if it has no numbers."""
     try:
         return np.asarray(value)
-    except Exception:  # whatever an object raises when it is asked for its numbers
+    except Exception:  # an object's own conversion may raise anything
         return np.empty(0, object)
 
 
 def _all_finite(array: np.ndarray) -> bool:
-    if array.size < 16:  # faster than the loop of numpy, whose start costs more
+    if array.size < 16:  # a Python loop is faster than starting numpy's
         return all(map(math.isfinite, array.ravel().tolist()))
     return bool(np.isfinite(array).all())

@@ -1,77 +1,112 @@
-"""The docstrings of the registered environments: what they have in common, and tables of what is seen."""
+"""Docstrings of the registered environments, with the numbers of their task, settings and reward."""
 
 import textwrap
-from typing import Any
+from dataclasses import fields
 
 import numpy as np
 from gymnasium import spaces
 
-from ccr_gym.observation import AHEAD, FORCE_SCALE_N, Observer
-from ccr_gym.tasks import Task
+from ccr_gym.adapters import AnyAdapter
+from ccr_gym.observation import Observer
+from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SCALE_MM, SUCCESS_ERROR
+from ccr_gym.scales import AHEAD, FORCE_SCALE_N, RADIUS_SCALE_MM
+from ccr_gym.settings import AnySettings
+from ccr_gym.tasks import LEVELS, AnyTask
+from solver import Robot
 
 WIDTH = 116
 AXES = {2: "x and y", 3: "x, y, z"}
 
 
-def describe(task: Task, title: str, description: str, start: str, *, action: str = "") -> str:
-    """A docstring in Farama's order of sections.
+def describe(task: AnyTask, title: str, description: str, start: str, *, action: str = "") -> str:
+    """Return a docstring with the sections of a Farama environment.
 
     Args:
         task: What an episode asks.
-        title: What the agent is to do.
-        description: Where, and what makes it hard.
-        start: What is drawn.
-        action: What the numbers of an action are, if they are not one cable increment.
+        title: What the agent has to do.
+        description: The scene, and what makes the task hard.
+        start: How episodes start, with fields of the task in braces.
+        action: Meaning of the action; by default that of a single cable increment.
     """
-    body = task.body
-    settings = body.settings()
-    cables = "the cable moves" if body.model.cables == 1 else "the cables move"
-    action = action or "cable increment as a fraction of `max_increment_mm`; positive pulls"
-    count = body.model.space
-    seen = "magnitudes, or vectors with `force_vector` where their difference is taken" if count == 3 else "magnitudes"
+    settings = task.adapter.settings_class()
+    adapter = task.adapter(settings, task.adapter.make_batch(settings, 1, task.obstacles, 1).layout)
     parts = {
         "Description": description,
-        "Action Space": f"""`Box(-1, 1, ({body.actions},), float32)`: {action}. It is carried out as far as tension
-            limit and obstacles allow; {cables} within {"±" if count == 3 else "0 to "}`cable_limit_mm`
-            ({settings.cable_limit_mm:g} mm).""",
+        "Action Space": _actions(adapter, action),
         "Observation Space": f"""With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their
-            concatenation in this order. Indices are of the flat form for the default robot of
-            n = {settings.robot.segments} segments and ideal sensing; everything is clipped to its bounds.
+            concatenation in this order. The indices are those of the flat form, for the default robot of
+            n = {settings.robot.segments} segments and ideal sensing; entries are clipped to their bounds.
 
-{table(task, settings)}
+{_table(task, adapter, settings)}
 
             Without `force_sensor` the keys `force_error` and `force_measured` are absent.""",
-        "Rewards": f"""The sum of named terms, each in `info["reward_terms"]`; F is the true contact force, F_d the
-            set-point, {seen}: `force_error` −min(|F−F_d|/F_d, 1); `accuracy` exp(−|F−F_d|/(5 % F_d)); `overshoot`
-            −min(max(F/F_d−1, 0), 1) / 2; `approach` minus the clearance in units of 100 mm while nothing touches;
-            `effort` −0.02 times the mean square of the action.""",
-        "Starting State": start,
+        "Rewards": _rewards(settings, adapter.space),
+        "Starting State": start.format(**_field_texts(task)),
         "Episode End": f"No state is terminal. Episodes are truncated after {task.steps} steps.",
-        "Info": f"""`force_true` and `force_est` (force on the robot, ({count},) [N]), `desired_force` [N], `cable_mm`,
-            `tension` [N], `solver_status` (`solver.Status` as a number), `cost` (force above `force_limit` [N]),
-            `is_success` (within 5 % of the set-point), `reward_terms`.""",
-        "Arguments": f"""`render_mode`, the fields of `ccr_gym.settings.{type(settings).__name__}`, and `task`:
-            `{type(task).__name__}` or a mapping of its fields; mappings make every argument JSON-able.
-            `sensing="realistic"` puts backlash, latency, noise, bias, unknown friction and unknown rigidity between
-            robot and agent, each episode's own; `split="train"` and `split="test"` draw from scenes that have none in
-            common.""",
+        "Info": f"""`force_true` and `force_est` (force on the robot, ({adapter.space},) [N]), `desired_force` [N],
+            `cable_mm`, `tension` [N], `solver_status` (value of `solver.Status`), `cost` (force above `force_limit`
+            [N]), `is_success` (within {100 * SUCCESS_ERROR:g} % of the set-point), `reward_terms`.""",
+        "Arguments": f"""`render_mode`, the fields of `ccr_gym.settings.{type(settings).__name__}`, and `task`, given as
+            `{type(task).__name__}` or as a mapping of its fields. Mappings make every argument JSON-able.
+            `sensing="realistic"` adds backlash, latency, noise, bias, unknown friction and unknown rigidity, sampled
+            anew in every episode. `split="train"` and `split="test"` sample from disjoint sets of scenes.""",
         "Version History": "* v0: initial version.",
     }
     sections = [f"## {name}\n{_wrapped(text)}" for name, text in parts.items()]
     return title + "\n\n" + "\n\n".join(sections) + "\n"
 
 
-def table(task: Task, settings: Any) -> str:
-    """What is seen, with its indices, meaning, scale and bounds."""
-    body, robot = task.body, settings.robot
-    observer = Observer(body, settings, body.layout(robot, task.obstacles), task)
+def _actions(adapter: AnyAdapter, action: str) -> str:
+    """Return the text of the action space."""
+    action = action or "cable increment as a fraction of `max_increment_mm`; a positive one pulls"
+    low, high = adapter.actions.low_mm, adapter.actions.high_mm
+    cables = "the cable displacement stays" if adapter.cables == 1 else "the cable displacements stay"
+    bounds = [f"{cables} within {low[0]:g} to {high[0]:g} mm (`cable_limit_mm`)"]
+    if adapter.actions.size > adapter.cables:
+        bounds.append(f"the length within {low[-1]:g} to {high[-1]:g} mm (`robot.length_range_mm`)")
+    return f"""`Box(-1, 1, ({adapter.actions.size},), float32)`: {action}. A move is carried out as far as the tension
+        limit and the obstacles allow; {", ".join(bounds)}. A full action moves by
+        {" and ".join(f"{full:g}" for full in adapter.actions.increment_mm)} mm."""
+
+
+def _rewards(settings: AnySettings, space: int) -> str:
+    """Return the text of the rewards."""
+    weights = settings.weights
+    kind = "magnitudes, or vectors with `force_vector` where they are subtracted" if space == 3 else "magnitudes"
+    return f"""The sum of named terms, each in `info["reward_terms"]`; F is the energy-based contact force, F_d the
+        set-point, {kind}: `force_error` −{weights.force_error:g} min(|F−F_d|/F_d, 1); `accuracy` {weights.accuracy:g}
+        exp(−{ACCURACY_RATE:g} |F−F_d|/F_d); `overshoot` −{weights.overshoot:g} min(max(F/F_d−1, 0), 1); `approach`
+        −{weights.approach:g} min(clearance / {CLEARANCE_SCALE_MM:g} mm, 1) while nothing touches; `effort`
+        −{weights.effort:g} times the mean square of the action."""
+
+
+def _field_texts(task: AnyTask) -> dict[str, object]:
+    """Return the fields of a task as texts, forces in mN, and the levels of a moving set-point."""
+    texts: dict[str, object] = {"levels": _text(LEVELS)}
+    for declared in fields(task):
+        value = getattr(task, declared.name)
+        scaled = tuple(1000 * end for end in value) if declared.name.endswith("_n") else value
+        texts[declared.name] = _text(scaled)
+    return texts
+
+
+def _text(value: object) -> object:
+    """Return a number or a range as text, a tuple of ranges as a list of texts."""
+    if not isinstance(value, tuple):
+        return f"{value:.3g}" if isinstance(value, float) else value
+    if isinstance(value[0], tuple):
+        return [_text(entry) for entry in value]
+    return "–".join(f"{end:g}" for end in value)
+
+
+def _table(task: AnyTask, adapter: AnyAdapter, settings: AnySettings) -> str:
+    """Return the table of observed entries: indices, meaning, scale and bounds."""
     rows = ["| Index | Key | Meaning | Scale | Bounds |", "| --- | --- | --- | --- | --- |"]
     start = 0
-    for key, box in observer.dict_space.items():
+    for key, box in Observer(adapter, task).dict_space.items():
         assert isinstance(box, spaces.Box)
         end = start + box.shape[0] - 1
-        low = int(np.min(box.low))
-        bounds = "{0, 1}" if key == "contact" else f"[{low}, 1]"
+        bounds = "{0, 1}" if key == "contact" else f"[{int(np.min(box.low))}, 1]"
         index = str(start) if start == end else f"{start}–{end}"
         meaning, scale = _meaning(key, task, settings)
         rows.append(f"| {index} | `{key}` | {meaning} | {scale} | {bounds} |")
@@ -79,33 +114,33 @@ def table(task: Task, settings: Any) -> str:
     return "\n".join(rows)
 
 
-def _meaning(key: str, task: Task, settings: Any) -> tuple[str, str]:
-    """What an entry of the observation is, and its scale."""
-    space, robot = task.body.model.space, settings.robot
-    lines = "backbone, first and second hole, opposite holes" if space == 3 else ", ".join(robot.touch)
-    length = f"{robot.length_mm if space == 3 else max(robot.lengths_mm):g} mm"
-    force = f"{FORCE_SCALE_N:g} N"
-    which = "" if task.target is None else f" of obstacle {task.target}"
+def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
+    """Return meaning and scale of an entry of the observation."""
+    robot, force = settings.robot, f"{FORCE_SCALE_N:g} N"
+    planar, space = isinstance(robot, Robot), task.adapter.space
+    lines = ", ".join(robot.touch) if planar else "backbone, first and second hole, opposite holes"
+    length = f"{max(robot.lengths_mm) if isinstance(robot, Robot) else robot.length_mm:g} mm"
+    whose = "" if task.target is None else f" of obstacle {task.target}"
     return {
-        "cable": ("cable displacement" if space == 2 else "signed displacements", f"{settings.cable_limit_mm:g} mm"),
+        "cable": ("cable displacement" if planar else "signed displacements", f"{settings.cable_limit_mm:g} mm"),
         "contact": (f"multiplier > 0, line by line ({lines}), nodes 0…n of each", "flag"),
         "desired_ahead": (f"set-point {', '.join(map(str, AHEAD))} steps ahead", force),
         "desired_force": ("set-point", force),
         "force_error": ("set-point minus measured magnitude", force),
-        "force_est": (f"virtual-work estimate of the force on the robot{which}, {AXES[space]} (eq. 11)", force),
-        "force_measured": (f"force on the robot{which} from a force sensor, {AXES[space]}", force),
+        "force_est": (f"virtual-work estimate of the force on the robot{whose}, {AXES[space]} (eq. 11)", force),
+        "force_measured": (f"force on the robot{whose} from a force sensor, {AXES[space]}", force),
         "frames": ("first and last axis of the disk of nodes 0…n, node by node", "1"),
         "length": ("inserted length", length),
         "nodes": (
             ("x, y, disk angle of nodes 0…n, node by node", f"{length}, {length}, π rad")
-            if space == 2
+            if planar
             else ("x, y, z of nodes 0…n, node by node", length)
         ),
-        "obstacle": ("centre x, y, z; axis of a cylinder, else 0; radius", f"{length}, 1, 20 mm"),
+        "obstacle": ("centre x, y, z; axis of a cylinder, else 0; radius", f"{length}, 1, {RADIUS_SCALE_MM:g} mm"),
     }[key]
 
 
 def _wrapped(text: str) -> str:
-    """Paragraphs at a readable width; tables as they are."""
+    """Return paragraphs at a readable width, tables unchanged."""
     paragraphs = text.split("\n\n")
     return "\n\n".join(p if p.startswith("|") else textwrap.fill(" ".join(p.split()), WIDTH) for p in paragraphs)

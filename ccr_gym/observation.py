@@ -1,115 +1,133 @@
-"""The observation: what is seen, how it is scaled, and its flat form. All of it for one environment or many."""
+"""The observation: its entries, their scales and bounds, and its flat form, for one environment or many."""
 
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 from gymnasium import spaces
 
-from ccr_gym.bodies import Body, Seen
-from ccr_gym.sensing import DELAYED
-from ccr_gym.settings import Settings
-from solver.common.layout import Layout
+from ccr_gym.adapters import AnyAdapter, Feature, Features
+from ccr_gym.quantities import Quantity
+from ccr_gym.scales import AHEAD, FORCE_SCALE_N
+from ccr_gym.sensing import DELAYED_KEYS
+from ccr_gym.tasks import AnyTask
 
-FORCE_SCALE_N = 0.5  # force that an observation of 1 stands for
-AHEAD = (2, 4, 8)  # steps that a moving set-point is seen ahead
-SENSOR_KEYS = ("force_error", "force_measured")  # seen with a force sensor only
+SENSOR_KEYS = ("force_error", "force_measured")  # absent without a force sensor
+NOT_NEGATIVE = ("length", "desired_ahead", "contact")
+ENCODER_KEYS = ("cable", "length")  # in the order of the actions
 
 
 class Observer:
-    """Writes what is seen as scaled float32 rows within the bounds of their space.
+    """Writes observations as scaled float32 rows within the bounds of their space.
+
+    Entries are features of the equilibrium block, or inputs: forces and obstacle features that are computed outside.
+
+    Attributes:
+        dict_space: Space of the named entries.
+        flat_space: Space of their concatenation.
+        delayed: Which columns are delayed by latency, ``(k,)`` bool.
 
     Args:
-        body: The model of the robot.
-        settings: What the environment was told.
-        layout: Where the numbers of an equilibrium stand in its block.
+        adapter: Adapter of the robot.
         task: What an episode asks.
     """
 
-    def __init__(self, body: Body, settings: Settings, layout: Layout, task: Any) -> None:
-        numbers, space = np.arange(layout.size), body.model.space
-        goal = space if task.force_vector else 1
-        forces = layout.force(numbers) if task.target is None else layout.forces(numbers)[task.target]
-        signed = -1.0 if body.model.cables > 1 else 0.0
-        seen: Seen = {  # what is a number of the block, and its scale
-            "cable": (layout.cables(numbers), 1 / settings.cable_limit_mm),
-            "contact": (layout.flags(numbers), 1.0),
-            "force_measured": (forces, 1 / FORCE_SCALE_N),
-            **body.poses(settings.robot, layout),
+    def __init__(self, adapter: AnyAdapter, task: AnyTask) -> None:
+        features, input_sizes = _features(adapter, task), _input_sizes(adapter, task)
+        sizes = {key: feature.columns.size for key, feature in features.items()} | input_sizes
+        keys = [key for key in sorted(sizes) if adapter.settings.force_sensor or key not in SENSOR_KEYS]
+        boxes: dict[str, spaces.Space[np.ndarray]] = {
+            key: _box(_lowest(key, sizes[key], adapter), sizes[key]) for key in keys
         }
-        told = {"desired_force": goal, "force_error": goal, "force_est": space}
-        if task.moving:
-            told["desired_ahead"] = len(AHEAD)
-        if settings.sensors:
-            told["force_measured"] = space
-        if body.obstacle_size:
-            told["obstacle"] = body.obstacle_size
-        lowest = {
-            "length": 0.0,
-            "desired_ahead": 0.0,
-            "cable": signed,
-            "contact": 0.0,
-            "desired_force": 0.0 if goal == 1 else -1.0,
-        }
-        sizes = {key: source.size for key, (source, _) in seen.items()} | told
-        keys = [key for key in sorted(sizes) if settings.force_sensor or key not in SENSOR_KEYS]
-        self.dict_space = spaces.Dict({key: _box(lowest.get(key, -1.0), (sizes[key],)) for key in keys})
-        boxes = [box for box in self.dict_space.values() if isinstance(box, spaces.Box)]
-        self._low, self._high = (np.concatenate([getattr(box, end) for box in boxes]) for end in ("low", "high"))
+        self.dict_space = spaces.Dict(boxes)
+        self._low, self._high = (np.concatenate([getattr(b, end) for b in boxes.values()]) for end in ("low", "high"))
         self.flat_space = spaces.Box(self._low, self._high)
         ends = np.cumsum([sizes[key] for key in keys]).tolist()
-        self._places = {key: slice(end - sizes[key], end) for key, end in zip(keys, ends, strict=True)}
-        # Numbers that stand alone are put in their place without an axis.
-        self._told = {
-            key: self._places[key] if told[key] > 1 else self._places[key].start for key in told if key in keys
+        self._columns = {key: slice(end - sizes[key], end) for key, end in zip(keys, ends, strict=True)}
+        # A single number is written to a column, without an axis.
+        self._input_columns = {
+            key: self._columns[key] if size > 1 else self._columns[key].start
+            for key, size in input_sizes.items()
+            if key in keys
         }
         self._source, self._scale = np.zeros(self._low.size, int), np.zeros(self._low.size)
+        for key in features.keys() & keys:
+            if key not in input_sizes:
+                self._source[self._columns[key]], self._scale[self._columns[key]] = features[key]
         self.delayed = np.zeros(self._low.size, bool)
-        for key in DELAYED:
-            self.delayed[self._places.get(key, slice(0))] = True
-        self._motors = {key: self._places[key] for key in ("cable", "length") if key in self._places}
-        for key in seen.keys() & keys:
-            source, scale = seen[key]
-            self._source[self._places[key]], self._scale[self._places[key]] = source.ravel(), scale
-        self._obstacle_scale = np.ones(body.obstacle_size)
-        self._obstacle_scale[:3] = 1 / settings.robot.length_mm
+        for key in DELAYED_KEYS:
+            self.delayed[self._columns.get(key, slice(0))] = True
+        self._obstacle_scale = np.ones(adapter.obstacle_size)
+        self._obstacle_scale[:3] = 1 / adapter.settings.robot.length_mm
 
-    def rows(self, blocks: np.ndarray, told: dict[str, Any], obstacle: np.ndarray) -> np.ndarray:
-        """The flat form of one robot, ``(k,)``, or of many, ``(N, k)``, before it is bounded.
+    def rows(self, blocks: np.ndarray, forces: Mapping[str, Quantity], obstacle: np.ndarray) -> np.ndarray:
+        """Return flat observations before they are clipped, ``(k,)`` for one robot, ``(N, k)`` for many.
 
         Args:
-            blocks: Equilibrium, ``(size,)`` or ``(N, size)``.
-            told: Forces [N]: set-point, set-point minus measured, and estimate; numbers or ``(..., d)``.
-            obstacle: What is seen of the obstacle, ``(..., o)``.
+            blocks: Equilibria, ``(size,)`` or ``(N, size)``.
+            forces: Inputs that are forces, numbers or ``(..., d)`` [N].
+            obstacle: Features of the obstacle, ``(..., obstacle_size)``.
         """
-        rows = blocks[:, self._source] if blocks.ndim > 1 else blocks.take(self._source)
+        one = blocks.ndim == 1
+        rows = blocks.take(self._source) if one else blocks[:, self._source]
         rows *= self._scale
-        one = blocks.ndim == 1  # whose places are found faster without an ellipsis
-        for key, force in told.items():
-            place = self._told.get(key)
-            if place is not None:
-                rows[place if one else (..., place)] = force / FORCE_SCALE_N
-        if "obstacle" in self._told:
-            rows[..., self._told["obstacle"]] = obstacle * self._obstacle_scale
+        for key, force in forces.items():
+            columns = self._input_columns.get(key)
+            if columns is not None:  # one row is written faster without an ellipsis
+                rows[columns if one else (..., columns)] = force / FORCE_SCALE_N
+        if "obstacle" in self._input_columns:
+            rows[..., self._input_columns["obstacle"]] = obstacle * self._obstacle_scale
         return rows
 
-    def correct(self, rows: np.ndarray, motors: np.ndarray) -> None:
-        """Put what the motors tell in the place of what they move, ``(..., actions)`` [mm]."""
+    def write_encoders(self, rows: np.ndarray, motor_mm: np.ndarray) -> None:
+        """Replace actuated coordinates by motor encoder readings, ``(..., actions)`` [mm]."""
         start = 0
-        for place in self._motors.values():
-            count = place.stop - place.start
-            rows[..., place] = motors[..., start : start + count] * self._scale[place]
-            start += count
+        for key in ENCODER_KEYS:
+            if (columns := self._columns.get(key)) is not None:
+                count = columns.stop - columns.start
+                rows[..., columns] = motor_mm[..., start : start + count] * self._scale[columns]
+                start += count
 
-    def bounded(self, rows: np.ndarray) -> np.ndarray:
-        """Rows within the bounds of the space, as float32; the rows are overwritten."""
+    def clip(self, rows: np.ndarray) -> np.ndarray:
+        """Return rows within the bounds of the space, as float32; overwrites the rows."""
         np.maximum(rows, self._low, out=rows)
         np.minimum(rows, self._high, out=rows)
         return rows.astype(np.float32)
 
     def entries(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """The dictionary form of flat rows ``(..., k)``, as views."""
-        return {key: rows[..., place] for key, place in self._places.items()}
+        """Return the named entries of flat observations ``(..., k)``, as views."""
+        return {key: rows[..., columns] for key, columns in self._columns.items()}
 
 
-def _box(low: float, shape: tuple[int, ...]) -> spaces.Box:
-    return spaces.Box(np.full(shape, low, np.float32), np.ones(shape, np.float32))
+def _features(adapter: AnyAdapter, task: AnyTask) -> Features:
+    """Return the entries that are read from the equilibrium block."""
+    layout, columns = adapter.layout, np.arange(adapter.layout.size)
+    force = layout.force(columns) if task.target is None else layout.forces(columns)[task.target]
+    return {
+        "cable": Feature(layout.cables(columns), 1 / adapter.settings.cable_limit_mm),
+        "contact": Feature(layout.flags(columns), 1.0),
+        "force_measured": Feature(force, 1 / FORCE_SCALE_N),
+        **adapter.pose_features(),
+    }
+
+
+def _input_sizes(adapter: AnyAdapter, task: AnyTask) -> dict[str, int]:
+    """Return the sizes of the entries that are computed outside of the equilibrium block."""
+    set_point = adapter.space if task.force_vector else 1
+    sizes = {"desired_force": set_point, "force_error": set_point, "force_est": adapter.space}
+    if task.moving:
+        sizes["desired_ahead"] = len(AHEAD)
+    if adapter.settings.sensors:
+        sizes["force_measured"] = adapter.space  # with noise, so not the block's
+    if adapter.obstacle_size:
+        sizes["obstacle"] = adapter.obstacle_size
+    return sizes
+
+
+def _lowest(key: str, size: int, adapter: AnyAdapter) -> float:
+    """Return the lower bound of an entry: 0 for what cannot be negative, otherwise −1."""
+    not_negative = key in NOT_NEGATIVE or (key == "cable" and adapter.space == 2)
+    return 0.0 if not_negative or (key == "desired_force" and size == 1) else -1.0
+
+
+def _box(low: float, size: int) -> spaces.Box:
+    return spaces.Box(np.full(size, low, np.float32), np.ones(size, np.float32))

@@ -1,43 +1,41 @@
-"""What stands between the robot and who controls it: motors with backlash, sensors with noise, bias and latency.
+"""The imperfections between robot and agent: motors with backlash, sensors with noise, bias and latency.
 
-Every episode has its own, drawn by its environment's generator when it begins, the noise of all its steps included.
+Every episode samples its own when it begins, all of its noise included, from the generator of its environment.
 """
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import check_fields, check_range, checked
+from ccr_gym.quantities import EnvIndex
 from solver.common.validation import SMALLEST
 
-if TYPE_CHECKING:
-    from ccr_gym.bodies import Body
-
 Range = tuple[float, ...]
-DELAYED = ("contact", "force_est", "force_error", "force_measured", "frames", "nodes")  # what comes late
-HISTORY = 8  # rows kept, beyond the largest latency
-NOISE_STEPS = 256  # after so many steps the noise of an episode repeats
+DELAYED_KEYS = ("contact", "force_est", "force_error", "force_measured", "frames", "nodes")
+HISTORY = 8  # observations kept, more than the largest latency
+NOISE_STEPS = 256  # steps after which the noise of an episode repeats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensing:
-    """Ranges that every episode draws from.
+    """Ranges of the imperfections, which every episode samples from.
 
     Attributes:
-        latency: Whole steps after which everything but the cables and the set-point is seen.
+        latency: Delay of all observations but cable displacements and set-point [steps].
         noise_n: Standard deviation of white noise on each component of the measured force [N].
-        bias_n: Constant error of each component, in size [N].
-        backlash_mm: Play between motor and cable: a reversal moves nothing until it is taken up [mm].
-        tendon_loss: Share of the cable load that friction takes before it is measured, unknown to the estimate.
-        rigidity_ratio: Rigidity of the robot over the one that is known; forces grow with it, shapes do not change.
+        bias_n: Magnitude of the constant error of each component of the measured force [N].
+        backlash_mm: Play between motor and cable: after a reversal the cable rests until it is taken up [mm].
+        tendon_loss: Share of the cable load lost to friction before it is measured, unknown to the estimator.
+        rigidity_ratio: Rigidity of the robot over its nominal value; it scales forces and leaves shapes unchanged.
 
     Raises:
-        ValueError: If a range is not two numbers, descends, or goes beyond what is possible.
+        ValueError: If a range is not two numbers within bounds, the smaller one first.
     """
 
-    latency: tuple[int, ...] = checked((1, 4), check_range, whole=True, low=0, high=HISTORY - 1)
+    latency: Range = checked((1, 4), check_range, whole=True, low=0, high=HISTORY - 1)
     noise_n: Range = checked((0.0005, 0.0015), check_range, low=0)
     bias_n: Range = checked((0.0, 0.003), check_range, low=0)
     backlash_mm: Range = checked((0.2, 0.6), check_range, low=0)
@@ -49,85 +47,90 @@ class Sensing:
 
 
 class SensorModel:
-    """The motors and sensors of many robots.
+    """Motors and sensors of many robots.
 
     Attributes:
-        rigidity_ratio: Rigidity of each robot over the one that is known, ``(N,)``.
-        grip: Share of each cable load that is measured, ``(N,)``.
+        rigidity_ratio: Rigidity of each robot over its nominal value, ``(N,)``.
+        measured_load_fraction: Fraction of each cable load that is measured, ``(N,)``.
 
     Args:
-        sensing: Ranges to draw from.
+        sensing: Ranges to sample from.
         count: Number N of robots.
-        body: Their model.
-        delayed: Which numbers of an observation come late, ``(columns,)`` bool.
+        space: Dimension d of the space.
+        actions: The actuated coordinates.
+        delayed: Which columns of an observation are delayed, ``(k,)`` bool.
     """
 
-    def __init__(self, sensing: Sensing, count: int, body: "Body", delayed: np.ndarray) -> None:
-        self._sensing, self._delayed = sensing, delayed
-        self._geared = np.arange(body.actions) < body.model.cables  # has play; the insertion has none
+    def __init__(self, sensing: Sensing, count: int, space: int, actions: ActionSpec, delayed: np.ndarray) -> None:
+        self._sensing, self._actions, self._delayed = sensing, actions, delayed
+        self._has_backlash = np.arange(actions.size) < actions.cables  # cables have, the insertion has none
         self._latency = np.zeros(count, int)
-        self._play = np.zeros(count)
-        self._noise = np.zeros((count, NOISE_STEPS, body.model.space))
-        self._motors = np.zeros((count, body.actions))
-        self._rows = np.zeros((count, HISTORY, delayed.size))
-        self._fresh = np.ones(count, bool)
+        self._backlash_mm = np.zeros(count)
+        self._noise = np.zeros((count, NOISE_STEPS, space))
+        self._motor_mm = np.zeros((count, actions.size))
+        self._history = np.zeros((count, HISTORY, delayed.size))
+        self._history_empty = np.ones(count, bool)
         self.rigidity_ratio, self.measured_load_fraction = np.ones(count), np.ones(count)
 
-    def begin(self, robot: int, generator: np.random.Generator, motors: Any) -> None:
-        """Draw the motors and sensors of an episode, which starts with the motors at these places."""
+    def begin_episode(self, robot: int, generator: np.random.Generator, motor_mm: np.ndarray) -> None:
+        """Sample motors and sensors of a robot's next episode, which begins with the motors at these positions."""
         sensing, space = self._sensing, self._noise.shape[2]
-        latency, play, loss, rigidity_ratio, noise, *biases = generator.random(5 + space).tolist()
+        latency, backlash, loss, rigidity, noise, *biases = generator.random(5 + space).tolist()
         low, high = sensing.latency
         self._latency[robot] = low + int(latency * (high - low + 1))
-        self._play[robot] = _between(sensing.backlash_mm, play)
-        self.measured_load_fraction[robot] = 1 - _between(sensing.tendon_loss, loss)
-        self.rigidity_ratio[robot] = math.exp(_between(tuple(map(math.log, sensing.rigidity_ratio)), rigidity_ratio))
-        bias = [_between(sensing.bias_n, abs(2 * part - 1)) * math.copysign(1, part - 0.5) for part in biases]
+        self._backlash_mm[robot] = _interpolate(sensing.backlash_mm, backlash)
+        self.measured_load_fraction[robot] = 1 - _interpolate(sensing.tendon_loss, loss)
+        self.rigidity_ratio[robot] = math.exp(_interpolate(tuple(map(math.log, sensing.rigidity_ratio)), rigidity))
+        bias = [_interpolate(sensing.bias_n, abs(2 * part - 1)) * math.copysign(1, part - 0.5) for part in biases]
         white = generator.normal(size=(NOISE_STEPS, space))
-        self._noise[robot] = bias + _between(sensing.noise_n, noise) * white
-        self._motors[robot] = motors
-        self._fresh[robot] = True
+        self._noise[robot] = bias + _interpolate(sensing.noise_n, noise) * white
+        self._motor_mm[robot] = motor_mm
+        self._history_empty[robot] = True
 
-    def drive(self, places: Any, increments: Any, bounds: tuple[np.ndarray, np.ndarray], which: Any) -> Any:
-        """Move motors by increments, within bounds; returns where that leaves what they move [mm].
+    def apply_backlash(self, actuated_mm: np.ndarray, increment_mm: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Move the motors by increments, within bounds, and return where that leaves the actuated coordinates [mm].
 
         Args:
-            places: Where that is, ``(..., actions)``, or ``(...,)`` for one [mm].
-            increments: Of the motors, likewise [mm].
-            bounds: Least and largest place, ``(actions,)`` each [mm].
-            which: Which robots.
+            actuated_mm: Actuated coordinates, ``(..., actions)``, or ``(...,)`` for a single one [mm].
+            increment_mm: Increments of the motors, likewise [mm].
+            index: The robots.
         """
-        low, high = bounds
-        motors = self._motors[which]
-        motors = np.minimum(np.maximum(motors + np.reshape(increments, motors.shape), low), high)
-        self._motors[which] = motors
-        slack = self.slack(which)
-        moved = np.minimum(np.maximum(np.reshape(places, motors.shape), motors - slack), motors + slack)
-        return np.reshape(np.minimum(np.maximum(moved, low), high), np.shape(places))
+        low, high, motor_mm = self._actions.low_mm, self._actions.high_mm, self._motor_mm[index]
+        motor_mm = np.minimum(np.maximum(motor_mm + np.reshape(increment_mm, motor_mm.shape), low), high)
+        self._motor_mm[index] = motor_mm
+        half = self.half_backlash_mm(index)
+        moved = np.minimum(np.maximum(np.reshape(actuated_mm, motor_mm.shape), motor_mm - half), motor_mm + half)
+        return np.reshape(np.minimum(np.maximum(moved, low), high), np.shape(actuated_mm))
 
-    def motors(self, which: Any) -> np.ndarray:
-        """Places of the motors, which is what their encoders tell, ``(..., actions)`` [mm]."""
-        return np.asarray(self._motors[which])
+    def motor_mm(self, index: EnvIndex) -> np.ndarray:
+        """Return the motor positions, as encoders read them, ``(..., actions)`` [mm]."""
+        return np.asarray(self._motor_mm[index])
 
-    def slack(self, which: Any) -> np.ndarray:
-        """How far the motors can be from what they move, ``(..., actions)`` [mm]."""
-        return np.asarray(np.asarray(self._play[which])[..., None] / 2 * self._geared)
+    def half_backlash_mm(self, index: EnvIndex) -> np.ndarray:
+        """Return how far motors and actuated coordinates can be apart, ``(..., actions)`` [mm]."""
+        return np.asarray(np.asarray(self._backlash_mm[index])[..., None] / 2 * self._has_backlash)
 
-    def noise(self, time: np.ndarray, which: Any) -> np.ndarray:
-        """Error of the measured force at a step, ``(..., d)`` [N]."""
-        return np.asarray(self._noise[np.arange(len(time))[which], time[which] % NOISE_STEPS])
+    def force_error(self, time: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return the error of the measured force at a step, bias and noise, ``(..., d)`` [N]."""
+        return np.asarray(self._noise[np.arange(len(time))[index], time[index] % NOISE_STEPS])
 
-    def late(self, rows: np.ndarray, time: np.ndarray, which: Any) -> np.ndarray:
-        """What is seen at a step where some of it comes late, ``(..., columns)``; at first, what was at first."""
-        robots = np.atleast_1d(np.arange(len(time))[which])
-        now, new, fresh = time[robots], rows.reshape(len(robots), -1), self._fresh[robots]
-        self._rows[robots[fresh]] = new[fresh, None]
-        self._fresh[robots] = False
-        self._rows[robots, now % HISTORY] = new
-        before = self._rows[robots, (now - self._latency[robots]) % HISTORY]
-        return np.where(self._delayed, before, new).reshape(rows.shape)
+    def apply_latency(self, rows: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return observations whose delayed columns are those of earlier steps, of the first step at the beginning.
+
+        Args:
+            rows: Present observations, ``(..., k)``.
+            time: Step of each episode, ``(N,)``.
+            index: The robots.
+        """
+        robots = np.atleast_1d(np.arange(len(time))[index])
+        now, present, empty = time[robots], rows.reshape(len(robots), -1), self._history_empty[robots]
+        self._history[robots[empty]] = present[empty, None]
+        self._history_empty[robots] = False
+        self._history[robots, now % HISTORY] = present
+        earlier = self._history[robots, (now - self._latency[robots]) % HISTORY]
+        return np.where(self._delayed, earlier, present).reshape(rows.shape)
 
 
-def _between(ends: Range, part: float) -> float:
+def _interpolate(ends: Range, part: float) -> float:
     low, high = ends
     return low + part * (high - low)

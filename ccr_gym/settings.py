@@ -1,8 +1,8 @@
-"""What an environment is told when it is made, checked once."""
+"""Settings of an environment, validated once."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Generic, Literal, TypeVar
 
 from ccr_gym.checks import (
     check_choice,
@@ -21,15 +21,16 @@ from solver import Robot
 from solver.common.validation import SMALLEST
 from solver.spatial import SpatialRobot
 
+RobotT = TypeVar("RobotT", bound=Robot | SpatialRobot)
 MAX_FRICTION = 10.0
 
 
-def check_sensing(name: str, value: Any) -> Any:
-    """Return ``"ideal"``, ``"realistic"`` or a :class:`Sensing`, which may come as a mapping of its fields.
+def check_sensing(name: str, value: object) -> str | Sensing:
+    """Return ``"ideal"``, ``"realistic"`` or a :class:`Sensing`, which may be given as a mapping of its fields.
 
     Raises:
         TypeError: If it is anything else.
-        ValueError: If it is another word, or as :class:`Sensing`.
+        ValueError: If it is another string, or a field is out of bounds.
     """
     if isinstance(value, str) and value in ("ideal", "realistic"):
         return value
@@ -40,29 +41,28 @@ def check_sensing(name: str, value: Any) -> Any:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """What all environments share.
+class BaseSettings(Generic[RobotT]):
+    """Settings that all environments share.
 
     Attributes:
-        robot: The robot, or a mapping of its fields; the paper's prototype by default.
-        obs_mode: ``"dict"`` or ``"flat"``.
-        force_sensor: Whether the exact contact force is observed beside the virtual-work estimate.
-        max_increment_mm: Cable increment of a full action [mm].
-        cable_limit_mm: Largest cable displacement a policy can command [mm].
+        robot: The robot, or a mapping of its fields; by default the paper's prototype.
+        obs_mode: Form of the observation: ``"dict"`` or ``"flat"``.
+        force_sensor: Whether the measured contact force is observed beside the virtual-work estimate.
+        max_increment_mm: Cable displacement of a full action [mm].
+        cable_limit_mm: Largest cable displacement that actions can command [mm].
         estimator_friction: Ratio μ of the virtual-work estimator (eq. 11), from 0 to 10.
-        force_limit: Contact force above which ``info["cost"]`` counts [N].
-        weights: Weights of the reward terms; a mapping of names to numbers is taken as well.
-        backend: ``"native"``, or ``"casadi"`` for the reference solver (slow).
-        sensing: ``"ideal"``, ``"realistic"``, or the ranges of what is not ideal, as
-            :class:`ccr_gym.sensing.Sensing` or a mapping of its fields.
-        split: Which scenes are drawn: ``"train"``, ``"test"``, which no training scene is in, or ``"all"``.
+        force_limit: Contact force above which ``info["cost"]`` is positive [N].
+        weights: Weights of the reward terms, or a mapping of names to weights.
+        backend: ``"native"``, or ``"casadi"`` for the reference solver, which is slow.
+        sensing: ``"ideal"``, ``"realistic"``, or a :class:`ccr_gym.Sensing` or mapping of its fields.
+        split: Scenes to sample: ``"train"``, ``"test"``, or ``"all"``; training and test scenes are disjoint.
 
     Raises:
-        TypeError: If an argument should be an object of another class.
+        TypeError: If an argument is an object of the wrong class.
         ValueError: If an argument is out of range; the message names the bound.
     """
 
-    robot: Any = nested(Robot, Robot.prototype)
+    robot: RobotT
     obs_mode: Literal["dict", "flat"] = checked("dict", check_choice, choices=("dict", "flat"))
     force_sensor: bool = checked(True, check_flag)
     max_increment_mm: float = checked(0.5, check_number, low=SMALLEST)
@@ -71,7 +71,7 @@ class Settings:
     force_limit: float = checked(0.3, check_number, low=SMALLEST)
     weights: RewardWeights = nested(RewardWeights)
     backend: Literal["native", "casadi"] = checked("native", check_choice, choices=("native", "casadi"))
-    sensing: Any = checked("ideal", check_sensing)
+    sensing: str | Sensing = checked("ideal", check_sensing)
     split: Literal["all", "train", "test"] = checked("all", check_choice, choices=("all", "train", "test"))
 
     def __post_init__(self) -> None:
@@ -89,10 +89,17 @@ class Settings:
 
     @property
     def sensors(self) -> Sensing | None:
-        """What is not ideal, if anything is."""
+        """Ranges of the imperfections, or ``None`` where sensing is ideal."""
         if self.sensing == "realistic":
             return Sensing()
         return self.sensing if isinstance(self.sensing, Sensing) else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings(BaseSettings[Robot]):
+    """Settings in the plane; see :class:`BaseSettings`."""
+
+    robot: Robot = nested(Robot, Robot.prototype)
 
 
 def _insertable() -> Robot:
@@ -100,37 +107,40 @@ def _insertable() -> Robot:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InsertionSettings(Settings):
-    """The same with a base that inserts the robot.
+class InsertionSettings(BaseSettings[Robot]):
+    """Settings in the plane with a base that inserts the robot; see :class:`BaseSettings`.
 
     Attributes:
-        robot: A robot with a ``length_range_mm``; 160 mm long and inserted to 140–180 mm by default, its cable sliding.
+        robot: A robot with a ``length_range_mm``; by default a rod 160 mm long, with lengths from 140 to 180 mm.
         max_insertion_mm: Insertion of a full action [mm].
     """
 
-    robot: Any = nested(Robot, _insertable)
+    robot: Robot = nested(Robot, _insertable)
     max_insertion_mm: float = checked(1.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
-        Settings.__post_init__(self)
+        BaseSettings.__post_init__(self)
         require(self.robot.length_range_mm is not None, "robot has no length_range_mm; give the lengths of insertion")
         require(self.backend == "native", f"backend is {self.backend!r}; with insertion it must be 'native'")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SpatialSettings(Settings):
-    """The same in space.
+class SpatialSettings(BaseSettings[SpatialRobot]):
+    """Settings in space; see :class:`BaseSettings`.
 
     Attributes:
-        robot: A :class:`solver.spatial.SpatialRobot`, or a mapping of its fields; the paper's prototype with a second
-            cable by default.
-        cable_limit_mm: Largest cable displacement a policy can command, either way [mm].
-        backend: ``"native"``; the reference solver tells too little in space.
+        robot: A :class:`solver.spatial.SpatialRobot`, or a mapping of its fields; by default the paper's prototype
+            with a second pair of cables.
+        cable_limit_mm: Largest cable displacement that actions can command, either way [mm].
+        backend: ``"native"``; the reference solver does not give all that is observed in space.
     """
 
-    robot: Any = nested(SpatialRobot, SpatialRobot.prototype)
+    robot: SpatialRobot = nested(SpatialRobot, SpatialRobot.prototype)
     cable_limit_mm: float = checked(10.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
-        Settings.__post_init__(self)
+        BaseSettings.__post_init__(self)
         require(self.backend == "native", f"backend is {self.backend!r}; in space it must be 'native'")
+
+
+AnySettings = Settings | InsertionSettings | SpatialSettings

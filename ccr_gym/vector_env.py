@@ -1,8 +1,7 @@
-"""The vector environment: a fleet behind Gymnasium's vector interface."""
+"""The vector environment: many episodes of one task behind Gymnasium's vector interface."""
 
 import os
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 import gymnasium
 import numpy as np
@@ -10,67 +9,57 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ccr_gym.checks import (
-    as_array,
-    check_array,
-    check_choice,
-    check_seed,
-    check_type,
-    check_whole,
-    refusal,
-    require,
-)
-from ccr_gym.env import METADATA, Observation, make_settings, single_spaces
+from ccr_gym.actions import ActionSpec
+from ccr_gym.checks import as_array, check_array, check_choice, check_seed, check_type, refusal, require
+from ccr_gym.contact_env import METADATA, Info, Observation, make_settings, single_spaces
 from ccr_gym.episodes import EpisodeBatch, PrivilegedState
+from ccr_gym.quantities import Quantity
 from ccr_gym.reward import TERMS
-from ccr_gym.tasks import Task
-from solver.common.validation import is_listed, shown
+from ccr_gym.tasks import MAX_STEPS, TASKS, AnyTask, make_task
+from solver.common.validation import check_sequence, check_whole, is_listed, shown
 
-Infos = dict[str, Any]
 MAX_ENVS = 65_536
-MAX_STEPS = 2**31 - 1
 THREADS_PER_CORE = 4
 ARGUMENTS = ("task", "num_envs", "max_episode_steps", "autoreset_mode", "threads", "render_mode")
 
 
 class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
-    """Many :class:`ccr_gym.env.ContactEnv` of one task, moved by one call of the solver.
+    """Many :class:`ccr_gym.ContactEnv` of one task, moved by one call of the solver.
 
-    Seeded alike, it returns what ``gymnasium.vector.SyncVectorEnv`` of the single environments would.
+    Results are bit-identical to those of ``gymnasium.vector.SyncVectorEnv``, for any number of threads.
 
     Args:
         task: What an episode asks.
-        num_envs: Number of environments, up to 65 536.
+        num_envs: Number N of environments, up to 65 536.
         max_episode_steps: Steps after which an episode is truncated; ``None`` for those of the task.
-        autoreset_mode: What happens after the end of an episode: the next step resets (``"NextStep"``), the last step
-            does (``"SameStep"``), or the caller (``"Disabled"``).
-        threads: Threads of the solver, up to four for each core of the machine; results do not depend on them.
+        autoreset_mode: When an environment is reset after the end of an episode: in the next step (``"NextStep"``), in
+            the last step (``"SameStep"``), or by the caller (``"Disabled"``).
+        threads: Threads of the solver, up to four per core.
         render_mode: ``None``; only single environments are rendered.
-        **settings: Fields of :class:`ccr_gym.settings.Settings`.
+        **settings: Fields of the task's settings, as :class:`ccr_gym.Settings`.
 
     Raises:
-        TypeError: If there is no argument of that name, or one should be an object of another class.
+        TypeError: If an argument is unknown, or an object of the wrong class.
         ValueError: If an argument is out of range; the message names the bound.
     """
 
     def __init__(
         self,
-        task: Task,
+        task: AnyTask,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
         render_mode: None = None,
-        **settings: Any,
+        **settings: object,
     ) -> None:
         require(render_mode is None, f"render_mode is {shown(render_mode)}; use vectorization_mode='sync' to render")
         self.task, self.settings = task, make_settings(type(self).__name__, task, settings, ARGUMENTS)
-        self.num_envs = num_envs = check_whole("num_envs", num_envs, low=1, high=MAX_ENVS)
-        most = THREADS_PER_CORE * (os.cpu_count() or 1)
-        reason = f"{THREADS_PER_CORE} for each core of this machine"
-        threads = check_whole("threads", threads, low=1, high=most, reason=reason)
+        self.num_envs = num_envs = check_whole("num_envs", num_envs, 1, MAX_ENVS)
+        most, reason = THREADS_PER_CORE * (os.cpu_count() or 1), f"{THREADS_PER_CORE} for each core of this machine"
+        threads = check_whole("threads", threads, 1, most, reason)
         steps = task.steps if max_episode_steps is None else max_episode_steps
-        self.max_episode_steps = check_whole("max_episode_steps", steps, low=1, high=MAX_STEPS)
+        self.max_episode_steps = check_whole("max_episode_steps", steps, 1, MAX_STEPS)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
         self._episodes = EpisodeBatch(task, self.settings, num_envs, threads)
@@ -78,25 +67,26 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._shape = (num_envs, self._episodes.body.actions)
+        self._shape = (num_envs, self.action_spec.size)
         self._steps = np.zeros(num_envs, int)
         self._ended = np.zeros(num_envs, bool)
         self._started = False
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, Infos]:
+        self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
+    ) -> tuple[Observation, Info]:
         """Start episodes in all environments, or in those of ``options["reset_mask"]``.
 
         A reset that raises changes nothing: neither the episodes nor the generators.
 
         Args:
-            seed: Seed of the first environment, the others counting on; or one for each; ``None`` goes on drawing.
-            options: ``{"reset_mask": (N,) bool}`` or nothing.
+            seed: Seed of the first environment, counted up for the others; or one for each; ``None`` to keep the
+                generators.
+            options: ``{"reset_mask": (N,) bool}``, or nothing.
 
         Raises:
-            RuntimeError: If the task and the robot do not fit: no draw of many is feasible.
-            TypeError: If the options are no mapping.
+            RuntimeError: If no feasible scene is found: the task does not suit the robot.
+            TypeError: If the options are not a mapping.
             ValueError: If there is not one seed for each environment, or the options are something else.
         """
         seeds, mask = self._seeds(seed), self._mask(options)
@@ -104,31 +94,26 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         for i in np.flatnonzero(mask):
             if generators[i] is None or seeds[i] is not None:
                 generators[i], _ = seeding.np_random(seeds[i])
-        self._begin(np.flatnonzero(mask), generators)
+        self._start(np.flatnonzero(mask), generators)
         self._generators = generators
         self._started = True
         reading = self._episodes.read()
         terms = tuple(np.zeros((len(TERMS), self.num_envs)))
         return self._observation(self._episodes.observe(reading)), _masked(self._episodes.infos(reading, terms), mask)
 
-    def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Infos]:
-        """Move the cables, and reset as the autoreset mode says.
+    def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
+        """Move the cables, and reset environments as the autoreset mode says.
 
         Raises:
-            gymnasium.error.ResetNeeded: Before the first reset, or after the end of an episode if nothing resets it.
-            ValueError: If the actions are not finite real numbers of the right shape; the state stays as it was.
+            gymnasium.error.ResetNeeded: Before the first reset, or after the end of an episode in the disabled mode.
+            ValueError: If the actions are not finite real numbers of the right shape; the state does not change.
         """
         disabled = self.autoreset_mode is AutoresetMode.DISABLED
         if not self._started or (disabled and self._ended.any()):
             raise gymnasium.error.ResetNeeded("call reset() before step(), with a reset_mask after the end of episodes")
-        effort = self._episodes.body.effort(check_array("actions", actions, self._shape))
+        clipped = self._episodes.adapter.clip(check_array("actions", actions, self._shape))
         resetting, everything = self._ended.copy(), np.ones(self.num_envs, bool)
-        if resetting.any():
-            self._begin(np.flatnonzero(resetting), self._generators)  # first: if no scene is found, nothing has moved
-            moving = np.flatnonzero(~resetting)
-            self._episodes.step(effort[moving], moving.tolist())
-        else:
-            self._episodes.step(effort)
+        self._move(clipped, resetting)
         self._steps += ~resetting
         reading = self._episodes.read()
         terms = self._episodes.rewards(reading)
@@ -141,12 +126,17 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             rows, infos = self._restart(truncated, rows, infos, terms)
         else:
             infos = _masked(infos, everything)
-        rewards = sum(terms)
+        rewards: Quantity = sum(terms)
         return self._observation(rows), rewards, np.zeros(self.num_envs, bool), truncated, infos
 
     @property
+    def action_spec(self) -> ActionSpec:
+        """Bounds and increments of what the actions of one environment move."""
+        return self._episodes.actions
+
+    @property
     def privileged_state(self) -> PrivilegedState:
-        """What no agent sees, of all environments.
+        """The hidden state of all environments, which agents do not observe.
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
@@ -154,30 +144,31 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._check_started("privileged_state")
         return self._episodes.privileged_state()
 
-    def probe(self, places: np.ndarray) -> np.ndarray:
-        """As :meth:`ccr_gym.episodes.EpisodeBatch.probe`.
+    def probe(self, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return contact forces at other actuated coordinates; see :meth:`ccr_gym.episodes.EpisodeBatch.probe`.
 
         Raises:
             gymnasium.error.ResetNeeded: Before the first reset.
-            ValueError: If the places are not finite real numbers of the right shape.
+            ValueError: If the coordinates are not finite real numbers of the right shape.
         """
         self._check_started("probe")
-        return self._episodes.probe(check_array("places", places, self._shape))
+        return self._episodes.probe(check_array("actuated_mm", actuated_mm, self._shape))
 
     def _check_started(self, asked: str) -> None:
         if not self._started:
             raise gymnasium.error.ResetNeeded(f"call reset() before {asked}")
 
-    def _seeds(self, seed: Any) -> list[int | None]:
-        """One seed for each environment, or ``None``."""
+    def _seeds(self, seed: object) -> list[int | None]:
+        """Return one seed for each environment, None to keep its generator."""
         if is_listed(seed):
-            require(len(seed) == self.num_envs, f"seed has {len(seed)} entries; it must have {self.num_envs}")
-            return [check_seed(f"seed[{i}]", entry) for i, entry in enumerate(seed)]
+            seeds = check_sequence("seed", seed, "one for each environment")
+            require(len(seeds) == self.num_envs, f"seed has {len(seeds)} entries; it must have {self.num_envs}")
+            return [check_seed(f"seed[{i}]", entry) for i, entry in enumerate(seeds)]
         first = check_seed("seed", seed)
         return [None if first is None else first + i for i in range(self.num_envs)]
 
-    def _mask(self, options: Any) -> np.ndarray:
-        """Which environments to reset."""
+    def _mask(self, options: Info | None) -> np.ndarray:
+        """Return which environments reset options ask to reset, ``(N,)`` bool."""
         wanted = "None, or a mapping of 'reset_mask' only"
         check_type("options", options, Mapping | None, wanted)
         if not options:
@@ -186,28 +177,37 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             raise refusal("options", options, wanted)
         mask = as_array(options["reset_mask"])
         if not (mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()):
-            raise refusal("reset_mask", options["reset_mask"], f"an array of {self.num_envs} bools, one of them true")
+            raise refusal("reset_mask", options["reset_mask"], f"an array of {self.num_envs} bools, at least one true")
         require(self._started or bool(mask.all()), "reset_mask is not all true; the first reset must be of all")
         return mask
 
+    def _move(self, actions: Quantity, resetting: np.ndarray) -> None:
+        """Reset some environments and step the others."""
+        if not resetting.any():
+            self._episodes.step(actions)
+            return
+        self._start(np.flatnonzero(resetting), self._generators)  # first: if it raises, nothing has moved
+        moving = np.flatnonzero(~resetting)
+        self._episodes.step(actions[moving], moving.tolist())
+
     def _restart(
-        self, ended: np.ndarray, rows: np.ndarray, infos: Infos, terms: tuple[np.ndarray, ...]
-    ) -> tuple[np.ndarray, Infos]:
-        """Begin new episodes in the place of some that have ended, which are told of in ``final_obs, final_info``."""
+        self, ended: np.ndarray, rows: np.ndarray, infos: Info, terms: tuple[np.ndarray, ...]
+    ) -> tuple[np.ndarray, Info]:
+        """Start new episodes where some have ended, whose last observation and info go into the info."""
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
             final[i] = self._observation(rows[i])
-        told: Infos = {"final_obs": final, "_final_obs": ended.copy(), "final_info": _masked(infos, ended)}
-        told["_final_info"] = ended.copy()
-        self._begin(np.flatnonzero(ended), self._generators)
+        final_infos = {"final_obs": final, "_final_obs": ended.copy(), "final_info": _masked(infos, ended)}
+        final_infos["_final_info"] = ended.copy()
+        self._start(np.flatnonzero(ended), self._generators)
         self._ended = np.zeros(self.num_envs, bool)
         reading, everything = self._episodes.read(), np.ones(self.num_envs, bool)
-        fresh = tuple(np.where(ended, 0.0, term) for term in terms)
-        return self._episodes.observe(reading), _masked(self._episodes.infos(reading, fresh), everything) | told
+        terms = tuple(np.where(ended, 0.0, term) for term in terms)
+        return self._episodes.observe(reading), _masked(self._episodes.infos(reading, terms), everything) | final_infos
 
-    def _begin(self, robots: np.ndarray, generators: list[np.random.Generator | None]) -> None:
-        names = robots.tolist()
-        self._episodes.draw(names, [generator for i in names if (generator := generators[i]) is not None])
+    def _start(self, robots: np.ndarray, generators: list[np.random.Generator | None]) -> None:
+        indices = robots.tolist()
+        self._episodes.start_sampled(indices, [generator for i in indices if (generator := generators[i]) is not None])
         self._steps[robots] = 0
         self._ended[robots] = False
 
@@ -215,21 +215,36 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         return rows if self.settings.obs_mode == "flat" else self._episodes.observer.entries(rows)
 
 
-def _autoreset_mode(mode: Any) -> AutoresetMode:
+def make_vector_env(
+    task_name: str, task: AnyTask | Mapping[str, object] | None = None, **kwargs: object
+) -> ContactVectorEnv:
+    """Return a vector environment of a task; the vector entry point of all registered ids.
+
+    Args:
+        task_name: Name of the task's class, as ``"PushObstacle"``.
+        task: The task, or a mapping of its fields; ``None`` for the defaults.
+        **kwargs: Arguments of :class:`ContactVectorEnv`.
+    """
+    task_class = TASKS[check_choice("task_name", task_name, choices=list(TASKS))]
+    make: Callable[..., ContactVectorEnv] = ContactVectorEnv  # which checks the types itself
+    return make(make_task(task_class, task), **kwargs)
+
+
+def _autoreset_mode(mode: object) -> AutoresetMode:
     if isinstance(mode, AutoresetMode):
         return mode
     return AutoresetMode(check_choice("autoreset_mode", mode, choices=[known.value for known in AutoresetMode]))
 
 
-def _masked(infos: Infos, mask: np.ndarray) -> Infos:
-    """Gymnasium's form: zero where an environment tells nothing, and a mask beside every entry."""
-    told: Infos = {}
+def _masked(infos: Info, mask: np.ndarray) -> Info:
+    """Return infos in Gymnasium's form: zero outside the mask, and the mask beside every entry."""
+    masked: Info = {}
     for key, value in infos.items():
         if isinstance(value, dict):
-            told[key] = _masked(value, mask)
+            masked[key] = _masked(value, mask)
+        elif mask.all():
+            masked[key] = value
         else:
-            told[key] = (
-                value if mask.all() else np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type())
-            )
-        told[f"_{key}"] = mask.copy()
-    return told
+            masked[key] = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type())
+        masked[f"_{key}"] = mask.copy()
+    return masked

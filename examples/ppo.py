@@ -1,6 +1,6 @@
-"""Proximal policy optimisation in one file, on the vector environments of ccr-gym.
+"""Proximal policy optimisation (PPO) in one file, on the vector environments of ccr-gym.
 
-After ``pip install '.[agents]'``: ``python examples/ppo.py --seed 1``; ``--help`` lists the settings.
+After ``pip install '.[agents]'`` run ``python examples/ppo.py --seed 1``; ``--help`` lists the settings.
 """
 
 import time
@@ -18,7 +18,7 @@ from torch.distributions import Normal
 
 import ccr_gym  # noqa: F401 - registers the ids
 
-TEST_SEED = 1_000_000  # beyond the seeds of training
+TEST_SEED = 1_000_000  # above the seeds of training
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Args:
     steps: int = 160_000
     """Environment steps to train for, rounded up to whole updates."""
     envs: int = 32
-    """Environments stepped side by side."""
+    """Environments stepped in parallel."""
     rollout: int = 64
     """Steps of each environment between updates."""
     minibatch: int = 256
@@ -40,29 +40,29 @@ class Args:
     epochs: int = 8
     """Passes over a rollout."""
     learning_rate: float = 1e-3
-    """Of Adam, decaying linearly to zero."""
+    """Learning rate of Adam; decays linearly to zero."""
     gamma: float = 0.9
-    """Discount of rewards."""
+    """Discount factor of rewards."""
     gae_lambda: float = 0.9
-    """Decay of advantages."""
+    """Decay λ of generalised advantages."""
     clip: float = 0.2
-    """Change of the probability ratio beyond which the policy gains nothing."""
+    """Change of the probability ratio at which the objective is clipped."""
     max_grad_norm: float = 0.5
-    """Norm to which gradients are cut."""
+    """Norm to which gradients are clipped."""
     log_std_init: float = -0.5
-    """Logarithm of the first exploration noise."""
+    """Logarithm of the initial standard deviation of actions."""
     width: int = 64
-    """Units in each of the two hidden layers."""
+    """Units per hidden layer (two layers)."""
 
 
 class Moments:
-    """Mean and variance of all rows seen so far."""
+    """Running mean and variance of rows."""
 
     def __init__(self, shape: tuple[int, ...] = ()) -> None:
         self.mean, self.variance, self.count = np.zeros(shape), np.ones(shape), 0
 
     def update(self, rows: np.ndarray) -> None:
-        """Take in more rows."""
+        """Update the statistics with more rows."""
         self.count += len(rows)
         share, shift = len(rows) / self.count, rows.mean(0) - self.mean
         self.variance = (1 - share) * (self.variance + share * shift**2) + share * rows.var(0)
@@ -75,7 +75,7 @@ class Moments:
 
 
 class Agent(nn.Module):
-    """A Gaussian policy and a value function, over scaled observations."""
+    """A Gaussian policy and a value function of normalised observations."""
 
     def __init__(self, observations: int, actions: int, args: Args) -> None:
         super().__init__()
@@ -85,21 +85,21 @@ class Agent(nn.Module):
         self.log_std = nn.Parameter(torch.full((actions,), args.log_std_init))
 
     def scale(self, observation: np.ndarray) -> Tensor:
-        """What the networks see of an observation."""
+        """Return an observation as the networks take it."""
         scaled = (observation - self.moments.mean) / self.moments.deviation
         return torch.from_numpy(scaled.clip(-10, 10)).float()
 
     def policy(self, scaled: Tensor) -> Normal:
-        """Distribution of the action."""
+        """Return the distribution of the action."""
         return Normal(self.mean(scaled), self.log_std.exp(), validate_args=False)
 
     def value(self, scaled: Tensor) -> Tensor:
-        """Expected return."""
+        """Return the expected return."""
         return self.critic(scaled).squeeze(-1)
 
 
 def network(inputs: int, width: int, outputs: int, gain: float) -> nn.Sequential:
-    """Two hidden layers of tanh, orthogonal at first; ``gain`` is that of the last layer."""
+    """Return a network with two tanh layers and orthogonal initial weights; ``gain`` scales those of the last layer."""
     layers = [nn.Linear(inputs, width), nn.Linear(width, width), nn.Linear(width, outputs)]
     for layer, scale in zip(layers, (2**0.5, 2**0.5, gain), strict=True):
         nn.init.orthogonal_(layer.weight, scale)
@@ -108,20 +108,20 @@ def network(inputs: int, width: int, outputs: int, gain: float) -> nn.Sequential
 
 
 def make(env_id: str, count: int) -> VectorEnv:
-    """Environments that reset in the step that ends an episode, and put its last observation into the infos."""
+    """Return environments that reset in the step that ends an episode; its last observation is in the infos."""
     settings: dict[str, Any] = {"obs_mode": "flat", "autoreset_mode": AutoresetMode.SAME_STEP}
     return gymnasium.make_vec(env_id, count, vectorization_mode="vector_entry_point", **settings)
 
 
 def final_errors(infos: dict[str, Any]) -> np.ndarray:
-    """Relative force errors at the end of the episodes that ended in this step."""
+    """Return the relative force errors of the episodes that ended in this step."""
     final, ended = infos["final_info"], infos["_final_info"]
     force = np.linalg.norm(final["force_true"][ended], axis=1)
     return np.abs(force / final["desired_force"][ended] - 1)
 
 
 class Experience:
-    """Environments that go on from rollout to rollout."""
+    """Environments whose episodes continue from rollout to rollout."""
 
     def __init__(self, args: Args) -> None:
         self.args, self.envs = args, make(args.env_id, args.envs)
@@ -131,7 +131,7 @@ class Experience:
 
     @torch.no_grad()
     def rollout(self, agent: Agent) -> tuple[Tensor, ...]:
-        """Scaled observations, actions, their log-probabilities, advantages and returns: a row for each step."""
+        """Return normalised observations, actions, their log-probabilities, advantages and returns, a row per step."""
         steps = []
         for _ in range(self.args.rollout):
             agent.moments.update(self.observation)
@@ -146,7 +146,7 @@ class Experience:
         return tuple(column.flatten(0, 1) for column in (seen, actions, log_probs, advantages, advantages + values))
 
     def _step(self, action: np.ndarray) -> tuple[Tensor, np.ndarray, Tensor]:
-        """Scaled rewards, the observations that follow in the same episodes, and which of these ended."""
+        """Return normalised rewards, the next observations of the same episodes, and which episodes ended."""
         self.observation, reward, _, ended, infos = self.envs.step(action.clip(-1, 1))
         following = self.observation.copy()
         if ended.any():
@@ -158,7 +158,7 @@ class Experience:
         return torch.from_numpy(reward / self.return_moments.deviation).float(), following, torch.from_numpy(ended)
 
     def _advantages(self, surprise: Tensor, ended: Tensor) -> Tensor:
-        """Generalised advantages; no state is terminal, so the end of an episode stops their sum but not the value."""
+        """Return generalised advantages; episodes are truncated, not terminated, so the last value counts."""
         decay = self.args.gamma * self.args.gae_lambda * ~ended
         advantages, later = torch.zeros_like(surprise), torch.zeros_like(surprise[0])
         for t in reversed(range(len(surprise))):
@@ -167,7 +167,7 @@ class Experience:
 
 
 def improve(agent: Agent, optimizer: torch.optim.Optimizer, batch: tuple[Tensor, ...], args: Args) -> None:
-    """Go over a rollout a few times: clipped surrogate of the policy, squared error of the value."""
+    """Train on a rollout for some epochs: clipped surrogate of the policy, squared error of the value."""
     for rows in (part for _ in range(args.epochs) for part in torch.randperm(len(batch[0])).split(args.minibatch)):
         scaled, action, log_prob, advantage, returns = (column[rows] for column in batch)
         advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
@@ -181,18 +181,18 @@ def improve(agent: Agent, optimizer: torch.optim.Optimizer, batch: tuple[Tensor,
 
 @torch.no_grad()
 def evaluate(agent: Agent, env_id: str, episodes: int = 100) -> np.ndarray:
-    """Final errors of the mean action, in scenes that were not trained on."""
+    """Return the final force errors of the mean action, in scenes that were not trained on."""
     envs = make(env_id, episodes)
     observation, _ = envs.reset(seed=TEST_SEED)
     ended = np.zeros(episodes, bool)
-    while not ended.all():  # all begin together and take the same number of steps
+    while not ended.all():  # all episodes start together and have the same length
         observation, _, _, ended, infos = envs.step(agent.mean(agent.scale(observation)).numpy().clip(-1, 1))
     return final_errors(infos)
 
 
 def main(args: Args) -> None:
-    """Train, and tell how it went."""
-    torch.set_num_threads(1)  # faster than more for networks this small
+    """Train the agent and print its errors."""
+    torch.set_num_threads(1)  # the fastest for networks this small
     torch.manual_seed(args.seed)
     experience, start = Experience(args), time.perf_counter()
     spaces = experience.envs.single_observation_space, experience.envs.single_action_space

@@ -1,4 +1,4 @@
-"""Exact optimisation kinematics of a cable-driven continuum robot among obstacles."""
+"""Exact optimisation-based kinematics of a cable-driven continuum robot among obstacles."""
 
 from solver.cache.memo import TransitionMemo
 from solver.common.equilibrium import Optimality, Residuals
@@ -6,10 +6,10 @@ from solver.common.obstacle import Extent, Obstacle
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.common.trace import Trace
-from solver.planar.batch import BatchSolver
+from solver.planar.batch import BatchSolver, ReferenceBatch
 from solver.planar.custom import Custom, Family
 from solver.planar.equilibrium import Equilibrium
-from solver.planar.forces import VirtualWork, force_true, onset_tension
+from solver.planar.forces import VirtualWork, force_true, onset_tension, virtual_work
 from solver.planar.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes
 from solver.planar.obstacles import Capsule, Circle, Ellipse, HalfPlane, Polygon
 from solver.planar.reference import ReferenceSolver
@@ -30,6 +30,7 @@ __all__ = [
     "Obstacle",
     "Optimality",
     "Polygon",
+    "ReferenceBatch",
     "ReferenceSolver",
     "Residuals",
     "Robot",
@@ -48,4 +49,6 @@ __all__ = [
     "onset_tension",
     "sensitivity",
     "tip_slopes",
+    "virtual_work",
 ]
+PART_OF = "ccr-gym"  # tells this package from others of its name

@@ -1,4 +1,4 @@
-"""Write the C source of the segment and gap laws: ``python codegen.py OUTPUT_DIRECTORY``, run by the build."""
+"""Generator of the C source of segment and gap laws, run by the build: ``python codegen.py OUTPUT_DIRECTORY``."""
 
 import sys
 from pathlib import Path
@@ -6,7 +6,7 @@ from types import ModuleType
 
 import casadi as ca
 
-for name in ("solver", "solver.spatial"):  # packages that need the kernel that is being built
+for name in ("solver", "solver.spatial"):  # whose __init__ needs the kernel, which is still to be built
     sys.modules[name] = package = ModuleType(name)
     package.__path__ = [str(Path(__file__).parent.joinpath(*name.split(".")[1:]))]
 
@@ -16,7 +16,7 @@ from solver.spatial import formulation as spatial  # noqa: E402
 
 
 def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
-    """Write ``name.c`` into an existing directory."""
+    """Write the C source of some functions as ``name.c`` into an existing directory."""
     generator = ca.CodeGenerator(name, {"casadi_int": "int"})
     for function in functions:
         generator.add(function)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from agents.sb3_adapter import SB3VecEnv
+from agents import SB3VecEnv
 from agents.tuned import PPO_IDEAL
 from ccr_gym import ENV_IDS
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-def test_ppo_trains_and_tells_its_error():
+def test_ppo_trains_and_prints_its_error():
     command = [sys.executable, str(EXAMPLES / "ppo.py"), "--steps", "2048", "--envs", "16", "--epochs", "1"]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
@@ -37,15 +37,15 @@ def test_in_ppo_the_last_observation_of_an_episode_follows_its_last_step():
 @pytest.mark.parametrize("env_id", ["CCR/LoadCell-v0", "CCR/PushObstacle-v0"])
 def test_the_settings_for_the_zoo_are_those_for_ideal_sensing(env_id):
     yaml = pytest.importorskip("yaml")
-    settings = yaml.safe_load((EXAMPLES / "rl_zoo_ppo.yml").read_text())
-    assert settings.keys() <= set(ENV_IDS)
-    told, config = settings[env_id], PPO_IDEAL
-    assert told.pop("env_wrapper") == "gymnasium.wrappers.FlattenObservation"
-    assert told.pop("normalize") is True
-    assert (told.pop("n_timesteps"), told.pop("n_envs")) == (config.steps, config.envs)
-    assert told.pop("learning_rate") == f"lin_{config.learning_rate}"
-    told["policy_kwargs"] = eval(told["policy_kwargs"])
-    assert told["policy_kwargs"] == {"net_arch": [config.width] * 2, "log_std_init": config.log_std_init}
-    model = PPO(env=SB3VecEnv(env_id, 1), device="cpu", **told | {"batch_size": told["n_steps"]})
-    assert (model.n_steps, told["batch_size"], model.n_epochs) == (config.rollout, config.batch_size, config.epochs)
+    by_id = yaml.safe_load((EXAMPLES / "rl_zoo_ppo.yml").read_text())
+    assert by_id.keys() <= set(ENV_IDS)
+    settings, config = by_id[env_id], PPO_IDEAL
+    assert settings.pop("env_wrapper") == "gymnasium.wrappers.FlattenObservation"
+    assert settings.pop("normalize") is True
+    assert (settings.pop("n_timesteps"), settings.pop("n_envs")) == (config.steps, config.envs)
+    assert settings.pop("learning_rate") == f"lin_{config.learning_rate}"
+    settings["policy_kwargs"] = eval(settings["policy_kwargs"])
+    assert settings["policy_kwargs"] == {"net_arch": [config.width] * 2, "log_std_init": config.log_std_init}
+    model = PPO(env=SB3VecEnv(env_id, 1), device="cpu", **settings | {"batch_size": settings["n_steps"]})
+    assert (model.n_steps, settings["batch_size"], model.n_epochs) == (config.rollout, config.batch_size, config.epochs)
     assert (model.gamma, model.gae_lambda) == (config.gamma, config.gae_lambda)

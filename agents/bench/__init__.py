@@ -1,1 +1,1 @@
-"""Benchmarks: ratios measured in one run, from medians."""
+"""Speed benchmarks: medians, and ratios of what was measured in the same run."""

@@ -1,7 +1,7 @@
-"""Benchmark of the kernel: the contact mix, beside IPOPT on the same steps, and growth with the number of segments.
+"""Benchmark of the kernel: the contact mix, IPOPT on the same steps, and growth with the number of segments.
 
-Times are of single calls of the compiled step, taken from Python with a nanosecond clock; they include the overhead of
-the call, which is measured and printed beside them.
+Times are of single calls of the compiled step, measured in Python with a nanosecond clock. They include the overhead of
+the call, which is measured and reported as well.
 """
 
 import time
@@ -10,10 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from timeit import timeit
-from typing import Any, Generic, Literal, TypeVar
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
+from agents.files import JsonObject
 from solver import (
     BatchSolver,
     Circle,
@@ -29,7 +30,7 @@ from solver import (
 
 STEPS_PER_SCENE = 100
 LARGEST_CABLE = 14.0  # [mm]
-DRIFT = 0.14  # mean cable increment, towards pulling [mm]
+DRIFT = 0.14  # mean cable increment; positive pulls [mm]
 
 
 SolverT = TypeVar("SolverT")
@@ -39,7 +40,15 @@ CommandT = TypeVar("CommandT")
 
 @dataclass(frozen=True, slots=True)
 class Timed(Generic[SolverT, EquilibriumT, CommandT]):
-    """One step of a mix: where it started, what was commanded, how it ended, and its time [µs]."""
+    """One timed step of a mix.
+
+    Attributes:
+        solver: The solver.
+        start: Equilibrium before the step.
+        command: The command.
+        end: Equilibrium after the step.
+        microseconds: Duration [µs].
+    """
 
     solver: SolverT
     start: EquilibriumT
@@ -52,7 +61,7 @@ PlanarStep = Timed[Solver, Equilibrium, float]
 
 
 def random_scene(generator: np.random.Generator, robot: Robot, count: int | None = None) -> Scene:
-    """Some circles, one to three unless told, in 35–75 × 75–150 mm, r 10–16 mm, clear of the straight robot."""
+    """Return one to three circles, or ``count``, in 35–75 × 75–150 mm, r 10–16 mm, clear of the straight robot."""
     while True:
         circles = [
             Circle(center=(generator.uniform(35, 75), generator.uniform(75, 150)), radius=generator.uniform(10, 16))
@@ -63,7 +72,7 @@ def random_scene(generator: np.random.Generator, robot: Robot, count: int | None
 
 
 def timed_step(solver: Solver, start: Equilibrium, command: float) -> PlanarStep:
-    """Step, with the time of the compiled call alone."""
+    """Return a step and the duration of its compiled call."""
     block = np.empty_like(start.block)
     begin = time.perf_counter_ns()
     status, iterations, _ = solver._kernel.step(start.block, command, start.length_mm, block)
@@ -74,7 +83,7 @@ def timed_step(solver: Solver, start: Equilibrium, command: float) -> PlanarStep
 
 
 def contact_mix(steps: int, seed: int = 0, robot: Robot = Robot.prototype()) -> Iterator[PlanarStep]:  # noqa: B008 - frozen
-    """Random increments of ±0.5 mm with a drift towards pulling, 100 steps a scene."""
+    """Yield steps of random increments of ±0.5 mm with a drift towards pulling, 100 steps per scene."""
     generator = np.random.default_rng(seed)
     for _ in range(steps // STEPS_PER_SCENE):
         solver = Solver(robot, random_scene(generator, robot))
@@ -87,17 +96,17 @@ def contact_mix(steps: int, seed: int = 0, robot: Robot = Robot.prototype()) -> 
 
 
 def call_overhead() -> float:
-    """Median time of a call that does next to nothing: a free robot of two segments, to where it already is [µs]."""
+    """Return the median duration of a call that does next to nothing: a free robot of two segments that stays [µs]."""
     solver = Solver(Robot.prototype(segments=2), Scene())
     return float(np.median([timed_step(solver, solver.rest(), 0.0).microseconds for _ in range(10_000)]))
 
 
 def reference_times(steps: list[PlanarStep]) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the kernel and of IPOPT on the same steps [µs]."""
+    """Return the durations of the kernel and of IPOPT on the same steps [µs]."""
     kernel, reference = [], []
     for step in steps:
         rival = ReferenceSolver(step.solver.robot, step.solver.scene)
-        rival.step(step.start, step.command)  # builds what is built once
+        rival.step(step.start, step.command)  # the first call builds the problem
         begin = time.perf_counter_ns()
         rival.step(step.start, step.command)
         reference.append((time.perf_counter_ns() - begin) / 1e3)
@@ -111,7 +120,7 @@ PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25
 
 
 def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
-    """Mean over the steps of a path of each step's median time, by number of segments [µs]."""
+    """Return the mean over a path of each step's median duration, by number of segments [µs]."""
     solvers = {n: Solver(Robot.prototype(segments=n), Scene([PUSHED])) for n in counts}
     return {
         n: float(np.median([path_times(solver) for _ in range(repeats)], axis=0).mean())
@@ -123,16 +132,16 @@ FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(31)]
 
 
 def cost(obstacles: list[Circle], model: Literal["paper", "rod"] = "paper", repeats: int = 40) -> float:
-    """Time of a path among obstacles over that with one and the paper's model; medians of runs side by side."""
-    plain = Solver(Robot.prototype(), Scene([PUSHED]))
+    """Return the duration of a path relative to that of the paper's model with one obstacle; medians of paired runs."""
+    reference = Solver(Robot.prototype(), Scene([PUSHED]))
     other = Solver(replace(Robot.prototype(), model=model), Scene(obstacles))
-    times = np.array([(path_times(plain), path_times(other)) for _ in range(repeats)])
-    mean_plain, mean_other = np.median(times, axis=0).mean(axis=1)
-    return float(mean_other / mean_plain)
+    times = np.array([(path_times(reference), path_times(other)) for _ in range(repeats)])
+    mean_reference, mean_other = np.median(times, axis=0).mean(axis=1)
+    return float(mean_other / mean_reference)
 
 
 def cold_ratio(repeats: int = 40) -> float:
-    """Time from rest to 8 mm by continuation in steps of 0.25 mm over that of the last step alone."""
+    """Return the duration from rest to 8 mm, in steps of 0.25 mm, relative to that of the last step alone."""
     solver = Solver(Robot.prototype(), Scene([PUSHED]))
     upwards = len(PATH) // 2
     times = np.median([path_times(solver)[:upwards] for _ in range(repeats)], axis=0)
@@ -140,19 +149,19 @@ def cold_ratio(repeats: int = 40) -> float:
 
 
 def memo_ratio(repeats: int = 21) -> float:
-    """Time of a warm step over that of its replay from the memo, called from Python; medians of runs side by side."""
+    """Return the duration of a warm step relative to that of its replay from the memo; medians of paired runs."""
     solver = Solver(Robot.prototype(), Scene([PUSHED]))
     memo, now = TransitionMemo(solver), solver.rest()
     for command in PATH[:30]:
         now = solver.step(now, float(command))
     memo.step(now, 7.75)
-    steps = [partial(who.step, now, 7.75) for who in (solver, memo)]
+    steps = [partial(stepper.step, now, 7.75) for stepper in (solver, memo)]
     warm, replay = np.median([[timeit(step, number=1000) for step in steps] for _ in range(repeats)], axis=0)
     return float(warm / replay)
 
 
 def path_times(solver: Solver) -> list[float]:
-    """Times of the steps of the path to 8 mm and back [µs]."""
+    """Return the durations of the steps of the path to 8 mm and back [µs]."""
     now, times = solver.rest(), []
     for command in PATH:
         step = timed_step(solver, now, float(command))
@@ -162,7 +171,7 @@ def path_times(solver: Solver) -> list[float]:
 
 
 def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
-    """Median time of a robot's step on the contact mix alone, in a batch on one thread, and on two [µs]."""
+    """Return the median duration of a robot's step alone, in a batch on one thread, and on two [µs]."""
     generator, robot = np.random.default_rng(0), Robot.prototype()
     scenes = [random_scene(generator, robot, 1) for _ in range(count)]
     solvers = [Solver(robot, scene) for scene in scenes]
@@ -183,15 +192,15 @@ def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
             batch.step(commands)
             times[k, column] = (time.perf_counter_ns() - begin) / 1e3 / count
     times[:, 0] = np.nan
-    for k, starts, commands in records:  # each robot twice, so that what it needs is at hand, as in a loop of its own
+    for k, starts, commands in records:  # each robot twice, so that its data is in the cache, as in a loop of its own
         pairs = list(zip(solvers, starts, commands, strict=True))
         times[k, 0] = sum(min(timed_step(*pair).microseconds for _ in range(2)) for pair in pairs) / count
     alone, one, two = np.nanmedian(times, axis=0).tolist()
     return alone - call_overhead(), one, two
 
 
-def measure(steps: int, rivals: int) -> dict[str, Any]:
-    """All of the above, by name."""
+def measure(steps: int, rivals: int) -> JsonObject:
+    """Return all measurements by name."""
     times, statuses, touching = np.empty(steps), Counter[str](), 0
     sample: list[PlanarStep] = []
     for i, step in enumerate(contact_mix(steps)):

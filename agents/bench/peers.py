@@ -1,9 +1,9 @@
-"""What other tools make of the same robot: CasADi's SQP method on the node problem, and MuJoCo on a chain of hinges.
+"""Other tools on the same robot: CasADi's SQP method on the node problem, and MuJoCo on a chain of hinges.
 
-The SQP method solves the very problem, to the same solution. MuJoCo simulates a robot with inertia and soft contacts
-until it rests; its tendon slides, so it stands beside our robot with a sliding cable. Its hinges replace our arcs: even
-in exact equilibrium, with a rigid contact, they differ by some percent of force at 18 segments, most where it is small.
-Its tuning was searched on the path measured here, in its favour.
+The SQP method solves the same problem to the same solution. MuJoCo simulates a robot with inertia and soft contacts
+until it is at rest; its tendon slides, so it is compared with the rod model. Its hinges replace our arcs: even in exact
+equilibrium with a rigid contact, the force differs by some percent at 18 segments, most where it is small. MuJoCo's
+parameters were tuned on the path measured here, in its favour.
 
 MuJoCo is optional: ``pip install mujoco``.
 """
@@ -13,19 +13,20 @@ import importlib.util
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from agents.bench.kernel import PUSHED, timed_step
+from agents.files import JsonObject
 from solver import Circle, Equilibrium, ReferenceSolver, Robot, Scene, Solver
 
 PULLS = tuple(float(cable) for cable in np.arange(0.25, 8.01, 0.25))  # [mm]
-FIRST_PULL = 1.0  # from which the node problem is compared: it is degenerate at none [mm]
-BEAD_MM = 1.0  # radius of the spheres that touch; the obstacle is smaller by as much
-SUBSTEPS, CHECK, CAP = 50, 5, 1000  # of a pull; between two looks whether it rests; after which it never will
-REST = 1e-3  # fastest hinge of a robot that rests [rad/s]
-SQP_OPTIONS: dict[str, Any] = {
+FIRST_PULL = 1.0  # the node problem is compared from here on, as it is degenerate without a pull [mm]
+BEAD_MM = 1.0  # radius of the spheres that touch; the obstacle is smaller by this
+SUBSTEPS, CHECK, CAP = 50, 5, 1000  # of a fixed pull; between checks for rest; at most
+REST = 1e-3  # largest hinge speed of a robot at rest [rad/s]
+SQP_OPTIONS: dict[str, object] = {
     "qpsol": "qrqp",
     "qpsol_options": {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False},
     "print_header": False,
@@ -42,18 +43,18 @@ SQP_OPTIONS: dict[str, Any] = {
 
 
 class SqpSolver(ReferenceSolver):
-    """The reference solver with CasADi's ``sqpmethod`` and exact Hessians in the place of IPOPT."""
+    """The reference solver with CasADi's ``sqpmethod`` and exact Hessians instead of IPOPT."""
 
     _plugin, _options = "sqpmethod", SQP_OPTIONS
 
 
-def sqp_times(pulls: tuple[float, ...] = PULLS, obstacle: Circle = PUSHED) -> dict[str, Any]:
-    """One solve by the SQP method for each pull beyond 1 mm, started as the reference solver starts its own.
+def sqp_times(pulls: tuple[float, ...] = PULLS, obstacle: Circle = PUSHED) -> JsonObject:
+    """Solve each pull beyond 1 mm by the SQP method, started as the reference solver starts its own.
 
     Returns:
-        ``step_ms`` with the guess and ``solve_ms`` of the method alone [ms], ``iterations`` and ``touching`` of each
-        step; ``failures`` counts steps not converged, left out of these; ``difference_mm`` is the largest distance of a
-        node from ours [mm].
+        For each converged step ``step_ms`` with the initial guess, ``solve_ms`` of the method alone, ``iterations`` and
+        ``touching``; ``failures``, the number of other steps; and ``difference_mm``, the largest distance of a node
+        from ours.
     """
     robot = Robot.prototype(max_tension=math.inf)
     solver, rival = Solver(robot, Scene([obstacle])), SqpSolver(robot, Scene([obstacle]))
@@ -84,7 +85,7 @@ def _pulled(solver: Solver, cable_mm: float) -> Equilibrium:
 
 
 class Contact(NamedTuple):
-    """MuJoCo's softness of a contact, in its own terms."""
+    """Softness of a contact in MuJoCo's parameters."""
 
     solref: str  # time constant [s], damping ratio
     solimp: str  # impedance at the surface and within, width between [m], midpoint, power
@@ -99,15 +100,15 @@ CONTACTS = {
 
 @dataclass(frozen=True, slots=True)
 class Tuning:
-    """What a quasi-static robot has not: chosen so that the chain rests after few substeps, with a taut tendon.
+    """Parameters that a quasi-static robot does not have, chosen so that the chain comes to rest in few substeps.
 
     Attributes:
-        timestep: Of a substep [s].
-        mass: Of the robot [kg].
+        timestep: Duration of a substep [s].
+        mass: Mass of the robot [kg].
         armature: Inertia added to every hinge [kg·m²].
-        damping: Of every hinge [N·m·s/rad].
-        gain: Of the tendon's length [N/m].
-        gain_damping: Of its rate [N·s/m].
+        damping: Damping of every hinge [N·m·s/rad].
+        gain: Gain of the tendon's length [N/m].
+        gain_damping: Gain of its rate [N·s/m].
     """
 
     timestep: float = 0.0055
@@ -119,9 +120,9 @@ class Tuning:
 
 
 def chain_xml(robot: Robot, obstacle: Circle | None, contact: Contact, tuning: Tuning) -> str:
-    """MuJoCo's description of the robot [m, kg, s, rad]: rigid disks, a hinge in the middle of every segment.
+    """Return MuJoCo's description of the robot [m, kg, s, rad]: rigid disks, a hinge in the middle of every segment.
 
-    The backbone and cable points are beads that touch the obstacle without friction, and nothing else.
+    Beads at the backbone and cable points touch the obstacle, without friction, and nothing else.
     """
     n, half, offset = robot.segments, robot.segment_mm / 2e3, robot.offset_mm / 1e3
     mass, inertia = tuning.mass / n, tuning.mass / n * offset**2 / 4
@@ -149,13 +150,13 @@ def chain_xml(robot: Robot, obstacle: Circle | None, contact: Contact, tuning: T
 
 
 class MujocoChain:
-    """A robot in MuJoCo, straight and at rest to begin with.
+    """A robot in MuJoCo that starts straight and at rest.
 
     Args:
-        robot: The robot; its cable slides, whatever it says.
+        robot: The robot; its cable slides, whatever its model.
         obstacle: A circle, or ``None``.
         contact: Softness of the contact.
-        tuning: Inertia, damping and gains.
+        tuning: Parameters of the simulation.
 
     Raises:
         ModuleNotFoundError: If MuJoCo is not installed.
@@ -165,7 +166,7 @@ class MujocoChain:
         self, robot: Robot, obstacle: Circle | None, contact: Contact = CONTACTS["tuned"], tuning: Tuning = Tuning()
     ) -> None:
         try:
-            self._mujoco: Any = importlib.import_module("mujoco")
+            self._mujoco = importlib.import_module("mujoco")
         except ModuleNotFoundError as error:
             raise ModuleNotFoundError("this comparison needs MuJoCo: pip install mujoco") from error
         self._robot = robot
@@ -173,13 +174,13 @@ class MujocoChain:
         self._data = self._mujoco.MjData(self._model)
 
     def pull(self, cable_mm: float, substeps: int = SUBSTEPS) -> int:
-        """Command a cable displacement [mm] and simulate; returns the number of substeps."""
+        """Command a cable displacement [mm] and simulate; return the number of substeps."""
         self._data.ctrl[0] = (self._robot.length_mm - cable_mm) / 1e3
         self._mujoco.mj_step(self._model, self._data, substeps)
         return substeps
 
     def settle(self, cable_mm: float) -> int:
-        """Command a cable displacement [mm] and simulate until the robot rests; returns the substeps, CAP if never."""
+        """Command a cable displacement [mm] and simulate until the robot rests; return the substeps, at most CAP."""
         substeps = self.pull(cable_mm, CHECK)
         while not np.abs(self._data.qvel).max() < REST and substeps < CAP:
             substeps += self.pull(cable_mm, CHECK)
@@ -192,7 +193,7 @@ class MujocoChain:
 
     @property
     def force(self) -> float:
-        """Size of the contact force [N]."""
+        """Magnitude of the contact force [N]."""
         total, wrench = np.zeros(3), np.zeros(6)
         for i, touch in enumerate(self._data.contact):
             self._mujoco.mj_contactForce(self._model, self._data, i, wrench)
@@ -200,23 +201,23 @@ class MujocoChain:
         return float(np.linalg.norm(total))
 
 
-def sliding_robot() -> Robot:
-    """The prototype with a sliding cable and no limit of tension."""
+def rod() -> Robot:
+    """Return the rod model of the prototype without a tension limit."""
     return replace(Robot.prototype(max_tension=math.inf), model="rod")
 
 
 def free_tip_error(cable_mm: float = 8.0) -> float:
-    """Distance of the tip of MuJoCo's chain from ours, when nothing touches [mm]."""
-    robot = sliding_robot()
+    """Return the distance of the tip of MuJoCo's chain from ours without contact [mm]."""
+    robot = rod()
     chain = MujocoChain(robot, None)
     for cable in np.linspace(0, cable_mm, 33)[1:]:
         chain.settle(float(cable))
     return float(np.linalg.norm(chain.tip - _pulled(Solver(robot, Scene()), cable_mm).nodes[-1, :2]))
 
 
-def our_path(repeats: int = 21) -> dict[str, Any]:
-    """Our solver on the path of pulls: steps per second, and the forces that the others are measured by [N]."""
-    solver, forces = Solver(sliding_robot(), Scene([PUSHED])), list[float]()
+def our_path(repeats: int = 21) -> JsonObject:
+    """Return ``steps_per_s`` of our solver on the path of pulls, and its ``forces``, the reference for MuJoCo [N]."""
+    solver, forces = Solver(rod(), Scene([PUSHED])), list[float]()
     runs = []
     for _ in range(repeats):
         now, times, forces = solver.rest(), [], []
@@ -229,14 +230,14 @@ def our_path(repeats: int = 21) -> dict[str, Any]:
     return {"steps_per_s": _rate(runs), "forces": forces}
 
 
-def mujoco_path(contact: Contact, settle: bool, forces: list[float], repeats: int = 7) -> dict[str, Any]:
-    """MuJoCo on the path of pulls, with a fixed number of substeps each or until it rests.
+def mujoco_path(contact: Contact, settle: bool, forces: list[float], repeats: int = 7) -> JsonObject:
+    """Measure MuJoCo on the path of pulls, with a fixed number of substeps each or until it rests.
 
     Args:
         contact: Softness of the contact.
         settle: Whether to simulate until the robot rests.
-        forces: Ours at every pull [N].
-        repeats: Runs, of which every step's median time is taken.
+        forces: Our force at every pull [N].
+        repeats: Number of runs; the median duration of every step counts.
 
     Returns:
         ``steps_per_s``; ``substeps_median`` and ``substeps_max``; ``unsettled`` pulls that never came to rest;
@@ -245,7 +246,7 @@ def mujoco_path(contact: Contact, settle: bool, forces: list[float], repeats: in
     """
     runs, found, substeps = [], np.empty(0), np.empty(0)
     for _ in range(repeats):
-        chain = MujocoChain(sliding_robot(), PUSHED, contact)
+        chain = MujocoChain(rod(), PUSHED, contact)
         rows = [_timed(chain, cable, settle) for cable in PULLS]
         times, substeps, found = np.array(rows).T
         runs.append(times.tolist())
@@ -270,15 +271,15 @@ def _timed(chain: MujocoChain, cable: float, settle: bool) -> tuple[float, int, 
 
 
 def _rate(runs: list[list[float]]) -> float:
-    """Steps per second of a path, from the times of its steps in several runs [s]."""
+    """Return the steps per second of a path, from the durations of its steps in several runs [s]."""
     return float(1 / np.median(runs, axis=0).mean())
 
 
-def measure() -> dict[str, Any]:
-    """What the peers take and how far they are from us; MuJoCo's part is left out where it is not installed."""
+def measure() -> JsonObject:
+    """Return speed and deviation of the other tools; MuJoCo only if it is installed."""
     sqp = sqp_times()
     touching = np.array(sqp["touching"])
-    found: dict[str, Any] = {
+    found: JsonObject = {
         "sqpmethod": {
             "solve_ms": float(np.median(np.array(sqp["solve_ms"])[touching])),
             "step_ms": float(np.median(np.array(sqp["step_ms"])[touching])),

@@ -1,18 +1,17 @@
-"""All benchmarks in one run: a table, and a JSON."""
+"""All speed benchmarks in one run, as tables and JSON."""
 
 import json
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from agents.bench import kernel, peers, space, throughput
 from agents.config import BenchConfig
-from agents.files import write_text
+from agents.files import JsonObject, write_text
 
 
-def bench(config: BenchConfig) -> dict[str, Any]:
-    """Measure, print and, where it is asked for, write."""
+def bench(config: BenchConfig) -> JsonObject:
+    """Measure, print the tables and, if a file is given, write the results."""
     if config.json is not None:
         config.json.parent.mkdir(parents=True, exist_ok=True)
     found = {
@@ -29,23 +28,23 @@ def bench(config: BenchConfig) -> dict[str, Any]:
     return found
 
 
-def show(title: str, numbers: dict[str, Any]) -> None:
-    """Print a part of the report."""
+def show(title: str, numbers: JsonObject) -> None:
+    """Print one table of the report."""
     table = Table(title=title, show_header=False)
     for name, value in _flat(numbers):
         table.add_row(name, _text(value))
     Console().print(table)
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(map(_text, value))
     return f"{value:,.4g}" if isinstance(value, float) else str(value)
 
 
-def _flat(numbers: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Nested numbers with their names joined."""
-    rows: list[tuple[str, Any]] = []
+def _flat(numbers: JsonObject) -> list[tuple[str, object]]:
+    """Return nested numbers with their names joined."""
+    rows: list[tuple[str, object]] = []
     for name, value in numbers.items():
         inner = [(f"{name} {key}", number) for key, number in _flat(value)] if isinstance(value, dict) else []
         rows += inner or [(name, value)]

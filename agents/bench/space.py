@@ -4,25 +4,25 @@ import math
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
 
 from agents.bench.kernel import Timed
+from agents.files import JsonObject
 from solver import Scene, Status
 from solver.spatial import Cylinder, SpatialEquilibrium, SpatialRobot, SpatialSolver, Sphere
 
 STEPS_PER_SCENE = 200
-GOAL_STEPS = 50  # steps that are drawn towards one place
+GOAL_STEPS = 50  # steps that drift towards the same goal
 LARGEST_CABLE = 11.0  # [mm]
 PUSHED = Sphere(center=(40, 18, 104), radius=15)
-WAY = np.array([1.0, 0.4])  # of the cables, towards it
+DIRECTION = np.array([1.0, 0.4])  # of the cables, towards it
 PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25)])
 SpatialStep = Timed[SpatialSolver, SpatialEquilibrium, np.ndarray]
 
 
 def random_obstacle(generator: np.random.Generator) -> Sphere | Cylinder:
-    """A sphere or a cylinder of 30 mm around the robot, 35–75 mm off its axis, 75–150 mm high, r 10–16 mm."""
+    """Return a sphere or a cylinder of 30 mm, 35–75 mm off the axis, 75–150 mm high, r 10–16 mm."""
     azimuth, radius = generator.uniform(0, 2 * math.pi), generator.uniform(10, 16)
     outward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     center = generator.uniform(35, 75) * outward + [0.0, 0.0, generator.uniform(75, 150)]
@@ -35,7 +35,7 @@ def random_obstacle(generator: np.random.Generator) -> Sphere | Cylinder:
 
 
 def random_solver(generator: np.random.Generator, robot: SpatialRobot) -> SpatialSolver:
-    """The robot among one to three of these, clear of them at rest."""
+    """Return a solver of the robot among one to three of these, clear of them at rest."""
     while True:
         try:
             return SpatialSolver(robot, Scene(random_obstacle(generator) for _ in range(generator.integers(1, 4))))
@@ -44,7 +44,7 @@ def random_solver(generator: np.random.Generator, robot: SpatialRobot) -> Spatia
 
 
 def timed_step(solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialStep:
-    """Step, with the time of the compiled call alone."""
+    """Return a step and the duration of its compiled call."""
     block, (first, second) = np.empty_like(start.block), cables.tolist()
     begin = time.perf_counter_ns()
     status, iterations, _ = solver._kernel.step(start.block, first, second, solver.robot.length_mm, block)
@@ -54,7 +54,7 @@ def timed_step(solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndar
 
 
 def contact_mix(steps: int, seed: int = 0) -> Iterator[SpatialStep]:
-    """Increments of both cables, ±0.3 mm at random beside a drift towards an obstacle or, for one in five, anywhere."""
+    """Yield steps of random increments of ±0.3 mm with a drift towards an obstacle or, one time in five, anywhere."""
     generator, robot = np.random.default_rng(seed), SpatialRobot.prototype()
     for _ in range(steps // STEPS_PER_SCENE):
         solver = random_solver(generator, robot)
@@ -68,8 +68,8 @@ def contact_mix(steps: int, seed: int = 0) -> Iterator[SpatialStep]:
             now = step.end
 
 
-def summary(mix: Iterable[SpatialStep]) -> dict[str, Any]:
-    """Times and events of a mix."""
+def summary(mix: Iterable[SpatialStep]) -> JsonObject:
+    """Return durations and events of a mix."""
     times, statuses, touching, crossings = [], Counter[str](), 0, 0
     for step in mix:
         times.append(step.microseconds)
@@ -87,7 +87,7 @@ def summary(mix: Iterable[SpatialStep]) -> dict[str, Any]:
 
 
 def _goal(generator: np.random.Generator, solver: SpatialSolver) -> np.ndarray:
-    """Displacements that bend the robot towards an obstacle, or anywhere."""
+    """Return displacements that bend the robot towards an obstacle, or anywhere."""
     x, y, _ = solver.scene.obstacles[generator.integers(len(solver.scene))].extent.center
     towards = np.array([x, y]) / math.hypot(x, y) * generator.uniform(4, 10)
     anywhere = generator.uniform(-8, 8, 2)
@@ -95,23 +95,23 @@ def _goal(generator: np.random.Generator, solver: SpatialSolver) -> np.ndarray:
 
 
 def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
-    """Mean over the steps of a path of each step's median time, by number of segments [µs]."""
+    """Return the mean over a path of each step's median duration, by number of segments [µs]."""
     return {n: float(np.median([path_times(n) for _ in range(repeats)], axis=0).mean()) for n in counts}
 
 
 def path_times(segments: int) -> list[float]:
-    """Times of the steps of a path to 8 mm and back [µs]."""
+    """Return the durations of the steps of a path to 8 mm and back [µs]."""
     solver = SpatialSolver(SpatialRobot.prototype(segments=segments), Scene([PUSHED]))
     now, times = solver.rest(), []
     for pull in PATH:
-        step = timed_step(solver, now, pull * WAY)
+        step = timed_step(solver, now, pull * DIRECTION)
         now = step.end
         times.append(step.microseconds)
     return times
 
 
-def measure(steps: int) -> dict[str, Any]:
-    """All of the above, by name."""
+def measure(steps: int) -> JsonObject:
+    """Return all measurements by name."""
     means = growth((9, 18, 36, 72, 144))
     return {
         **summary(contact_mix(steps)),

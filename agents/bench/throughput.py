@@ -1,10 +1,9 @@
-"""Steps a second of the environments and of a learner on them, beside peers measured in the same run."""
+"""Steps per second of the environments and of learning, next to peers measured in the same run."""
 
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,28 +12,31 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from agents.actor import LearnedPolicy
+from agents.benchmark.evaluate import run_episodes
 from agents.config import EVALUATION_SEED, TrainConfig
-from agents.evaluate import run_episodes
-from agents.learners import learner, scaled
-from agents.sb3_adapter import SB3VecEnv
-from agents.training import train
+from agents.files import JsonObject
+from agents.learning.actor import LearnedPolicy
+from agents.learning.learners import make_learner, normalized_envs
+from agents.learning.sb3_adapter import SB3VecEnv
+from agents.learning.training import train
 from agents.tuned import PPO_IDEAL
 
 OURS, PEER = "CCR/PushObstacle-v0", "Pendulum-v1"
-ROUNDS = 7  # of which the median counts
+ROUNDS = 7  # the median counts
 
 
 class IdleVecEnv(SB3VecEnv):
-    """The same spaces and the same episodes, in which nothing happens: what the learner costs by itself."""
+    """Environments of the same spaces and episodes in which nothing happens, to measure the learner alone."""
 
     def __init__(self, env_id: str, n_envs: int) -> None:
         super().__init__(env_id, n_envs, seed=0)
         self._still = np.asarray(super().reset())
-        self._steps, self._length = 0, self.get_attr("max_episode_steps")[0]
+        length = self.get_attr("max_episode_steps")[0]
+        assert isinstance(length, int)
+        self._steps, self._length = 0, length
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Nothing, and the end of all episodes at once."""
+        """Return the first observation again, and the end of all episodes at once."""
         self._steps += 1
         ended = self._steps % self._length == 0
         end = {"terminal_observation": self._still[0], "TimeLimit.truncated": True}
@@ -44,7 +46,7 @@ class IdleVecEnv(SB3VecEnv):
 
 
 def rates(runs: dict[str, Callable[[], int]]) -> dict[str, float]:
-    """Steps a second of some runs, each of which returns its number of steps; medians of rounds side by side."""
+    """Return the steps per second of runs, which return their number of steps; medians of alternating rounds."""
     seconds: dict[str, list[float]] = {name: [] for name in runs}
     steps = {}
     for _ in range(ROUNDS):
@@ -55,9 +57,9 @@ def rates(runs: dict[str, Callable[[], int]]) -> dict[str, float]:
     return {name: steps[name] / float(np.median(times)) for name, times in seconds.items()}
 
 
-def single(env_id: str, steps: int = 6400, **kwargs: Any) -> Callable[[], int]:
-    """A run of one environment through ``gymnasium.make``, resets included."""
-    env = gymnasium.make(env_id, **kwargs)
+def single(env_id: str, steps: int = 6400, **kwargs: object) -> Callable[[], int]:
+    """Return a run of one environment from ``gymnasium.make``, resets included."""
+    env = gymnasium.make(env_id, None, None, **kwargs)
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = [env.action_space.sample() for _ in range(1000)]
@@ -72,13 +74,12 @@ def single(env_id: str, steps: int = 6400, **kwargs: Any) -> Callable[[], int]:
     return run
 
 
-def vector(env_id: str, count: int, mode: str, steps: int = 0, **kwargs: Any) -> Callable[[], int]:
-    """A run of a vector environment, resets included: two of our episodes, or as many steps as are asked for."""
-    env = gymnasium.make_vec(env_id, count, vectorization_mode=mode, **kwargs)
+def vector(env_id: str, count: int, mode: str, steps: int = 130, **kwargs: object) -> Callable[[], int]:
+    """Return a run of a vector environment, resets included; by default of two of our episodes."""
+    env = gymnasium.make_vec(env_id, count, mode, None, None, **kwargs)
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = [env.action_space.sample() for _ in range(64)]
-    steps = steps or 130
 
     def run() -> int:
         for i in range(steps):
@@ -88,8 +89,8 @@ def vector(env_id: str, count: int, mode: str, steps: int = 0, **kwargs: Any) ->
     return run
 
 
-def environments(counts: tuple[int, ...] = (1, 4, 16, 64, 256, 1024)) -> dict[str, Any]:
-    """Single and vector environments beside Pendulum."""
+def environments(counts: tuple[int, ...] = (1, 4, 16, 64, 256, 1024)) -> JsonObject:
+    """Measure single and vector environments, next to Pendulum."""
     ours = single(OURS, obs_mode="flat")
     alone = rates({"ours": ours, "peer": single(PEER)})
     runs = {f"{count} × {threads}": _ours(count, threads) for count in sorted({*counts, 256}) for threads in (1, 2)}
@@ -109,11 +110,11 @@ def _ours(count: int, threads: int) -> Callable[[], int]:
 
 
 def learning(steps: int = 40_960) -> dict[str, float]:
-    """Frames a second of PPO on the bare observation, on our environment and on the idle one."""
+    """Measure the frames per second of PPO without a memory, on our environment and on the idle one."""
     torch.set_num_threads(1)
     config, count = TrainConfig(sensing="ideal", learner=PPO_IDEAL), PPO_IDEAL.envs
-    environments = {"ours": SB3VecEnv(OURS, count, 0), "idle": IdleVecEnv(OURS, count)}
-    models = {name: learner(scaled(VecMonitor(bare), config), config) for name, bare in environments.items()}
+    bare = {"ours": SB3VecEnv(OURS, count, 0), "idle": IdleVecEnv(OURS, count)}
+    models = {name: make_learner(normalized_envs(VecMonitor(envs), config), config) for name, envs in bare.items()}
     found = rates({name: _learn(model, steps) for name, model in models.items()})
     return {
         "ppo_frames_per_s": found["ours"],
@@ -122,9 +123,9 @@ def learning(steps: int = 40_960) -> dict[str, float]:
     }
 
 
-def solving(seeds: int, episodes: int = 60) -> dict[str, Any]:
-    """Wall time of training with ideal sensing, and the median final force error afterwards, for some seeds."""
-    found: dict[str, Any] = {"train_s": [], "median_final_error": []}
+def solving(seeds: int, episodes: int = 60) -> JsonObject:
+    """Measure the duration of training with ideal sensing, and the median final force error afterwards, by seed."""
+    found: JsonObject = {"train_s": [], "median_final_error": []}
     for seed in range(seeds):
         with tempfile.TemporaryDirectory() as folder:
             config = TrainConfig(run=Path(folder), seed=seed, sensing="ideal", learner=PPO_IDEAL)

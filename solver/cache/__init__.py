@@ -1,1 +1,1 @@
-"""Caches that keep steps fast and never change a result: transitions, and compiled functions."""
+"""Caches of solver steps and of compiled functions, which never change a result."""

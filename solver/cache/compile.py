@@ -1,4 +1,4 @@
-"""CasADi functions compiled at run time, for obstacles whose shape is an expression of the user's own."""
+"""Run-time compilation of CasADi functions, for obstacles whose shape is a user's expression."""
 
 import ctypes
 import functools
@@ -18,18 +18,18 @@ FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 
 @functools.cache
 def store() -> ArtefactStore:
-    """Where compiled laws are kept."""
+    """Return the store of compiled functions."""
     return ArtefactStore()
 
 
 @functools.cache
 def function_address(function: ca.Function) -> int:
-    """Return the address of a compiled function, valid for good.
+    """Return the address of a compiled function, valid for the life of the process.
 
-    Its type is that of CasADi's generated code, ``int f(const double**, double**, int*, double*, int)``.
+    Its signature is that of CasADi's generated code, ``int f(const double**, double**, int*, double*, int)``.
 
     Raises:
-        RuntimeError: If there is no C compiler, it fails, or what it makes cannot be loaded.
+        RuntimeError: If there is no C compiler, it fails, or its output cannot be loaded.
     """
     source = _source(function)
     compiler = _compiler()
@@ -42,7 +42,7 @@ def function_address(function: ca.Function) -> int:
     return address
 
 
-_LIBRARIES: list[ctypes.CDLL] = []  # stay loaded
+_LIBRARIES: list[ctypes.CDLL] = []  # which stay loaded
 
 
 def _load(path: Path) -> ctypes.CDLL:
@@ -50,40 +50,43 @@ def _load(path: Path) -> ctypes.CDLL:
         return ctypes.CDLL(str(path))
     except OSError as error:
         raise RuntimeError(
-            f"a compiled shape cannot be loaded ({error}); where the folder is mounted noexec, set CCR_GYM_CACHE to "
+            f"a compiled shape cannot be loaded ({error}); if its folder is mounted noexec, set CCR_GYM_CACHE to "
             "another, or use ReferenceSolver, which compiles nothing"
         ) from error
 
 
 def _source(function: ca.Function) -> str:
+    """Return the C source of a function."""
     generator = ca.CodeGenerator("law", {"casadi_int": "int"})
     generator.add(function)
     return str(generator.dump())
 
 
 def _compiler() -> list[str]:
+    """Return the command of the C compiler: ``$CC``, or the first of the usual ones that is installed."""
     chosen = os.environ.get("CC", "").strip()
     candidates = [chosen] if chosen else COMPILERS
-    for command in map(_words, candidates):
+    for command in map(_split, candidates):
         if shutil.which(command[0]):
             return command
     raise RuntimeError(
-        f"{' or '.join(candidates)} is not there, and a shape given as an expression is compiled for the solver; "
-        "install a C compiler or set CC to one, or use ReferenceSolver, which needs none"
+        f"no C compiler found (tried {', '.join(candidates)}); custom obstacles are compiled at run time: install one, "
+        "set CC, or use ReferenceSolver, which needs none"
     )
 
 
-def _words(command: str) -> list[str]:
+def _split(command: str) -> list[str]:
+    """Return the words of a command, the whole of it where its quotes do not close."""
     try:
         return shlex.split(command)
-    except ValueError:  # quotes that do not close
+    except ValueError:
         return [command]
 
 
 def _compile(compiler: list[str], source: str, path: Path) -> None:
-    written = path.with_suffix(".c")
-    written.write_text(source)
-    command = [*compiler, *FLAGS, str(written), "-o", str(path), "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise RuntimeError(f"{shlex.join(command)} failed:\n{done.stderr}")
+    input_path = path.with_suffix(".c")
+    input_path.write_text(source)
+    command = [*compiler, *FLAGS, str(input_path), "-o", str(path), "-lm"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        raise RuntimeError(f"{shlex.join(command)} failed:\n{result.stderr}")

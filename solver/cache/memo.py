@@ -1,40 +1,48 @@
-"""Steps of the solver that need not be computed twice."""
+"""Memo of solver steps: each distinct step is solved once."""
 
 from collections import OrderedDict
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import Generic, NamedTuple, ParamSpec, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from solver.common.validation import instance, whole
+from solver.common.validation import check_whole, shown
 
 
 class State(Protocol):
-    """An equilibrium, as far as a memo is concerned."""
+    """An equilibrium, as far as the memo uses it."""
 
     @property
     def block(self) -> np.ndarray:
-        """Its numbers."""
+        """All numbers of the equilibrium."""
 
 
 StateT = TypeVar("StateT", bound=State)
+Command = ParamSpec("Command")
 
 
 @runtime_checkable
-class Stepper(Protocol[StateT]):
+class Stepper(Protocol[StateT, Command]):
     """A solver, in the plane or in space."""
 
     def rest(self) -> StateT:
         """Return the straight, unactuated robot."""
 
-    def step(self, equilibrium: StateT, *command: Any) -> StateT:
+    def step(self, equilibrium: StateT, *args: Command.args, **kwargs: Command.kwargs) -> StateT:
         """Move from an equilibrium to a command."""
 
-    def check_command(self, equilibrium: StateT, *command: Any) -> tuple[float, ...]:
-        """Return a command as plain numbers; refuse one out of range, or an equilibrium of another solver."""
+    def check_command(self, equilibrium: StateT, *args: Command.args, **kwargs: Command.kwargs) -> tuple[float, ...]:
+        """Return a command as floats; refuse one out of range, or an equilibrium of another solver."""
 
 
 class MemoStatistics(NamedTuple):
-    """Steps a :class:`TransitionMemo` knew and had to compute since it was cleared, steps it keeps, and their bound."""
+    """Use of a :class:`TransitionMemo` since it was cleared.
+
+    Attributes:
+        hits: Steps that were remembered.
+        misses: Steps that had to be solved.
+        size: Steps in the memo now.
+        capacity: Largest number of steps it keeps.
+    """
 
     hits: int
     misses: int
@@ -42,62 +50,64 @@ class MemoStatistics(NamedTuple):
     capacity: int
 
 
-class TransitionMemo(Generic[StateT]):
-    """Stands in for a solver and remembers its latest steps, for work that repeats them: resets, replays, planners.
+class TransitionMemo(Generic[StateT, Command]):
+    """Wraps a solver and remembers its latest steps, for work that repeats them: resets, replays, planners.
 
-    A step is a function of the state's numbers and the command, and these are the key. Not to be shared by threads.
+    A step depends on the numbers of the state and on the command alone; these are the key. Not thread-safe.
 
     Args:
-        solver: Answers what is not known yet.
-        capacity: Steps to keep, about 3 kB each; the least recently used goes first.
+        solver: Solves the steps that are not in the memo.
+        capacity: Steps to keep, about 3 kB each; the least recently used is dropped first.
 
     Raises:
         ValueError: If ``capacity`` is not a positive whole number.
-        TypeError: If ``solver`` is something else.
+        TypeError: If ``solver`` is not a solver.
     """
 
-    def __init__(self, solver: Stepper[StateT], capacity: int = 4096) -> None:
-        instance("solver", solver, Stepper, "a memo stands in for a solver")
+    def __init__(self, solver: Stepper[StateT, Command], capacity: int = 4096) -> None:
+        if not isinstance(solver, Stepper):
+            raise TypeError(f"solver is {shown(solver)}; it must be a solver: it needs rest(), step(), check_command()")
         self._solver = solver
-        self._capacity = whole("capacity", capacity, 1, 2**31)
+        self._capacity = check_whole("capacity", capacity, 1, 2**31)
         self.clear()
 
     def rest(self) -> StateT:
         """Return the straight, unactuated robot."""
         return self._solver.rest()
 
-    def step(self, equilibrium: StateT, *command: Any) -> StateT:
+    def step(self, equilibrium: StateT, *args: Command.args, **kwargs: Command.kwargs) -> StateT:
         """Return what the solver's ``step`` returns, bit for bit.
 
         Args:
-            equilibrium: Where the robot is.
-            command: The other arguments of that ``step``.
+            equilibrium: State to start from.
+            args: The other arguments of the solver's ``step``.
+            kwargs: The same by name.
 
         Returns:
-            The equilibrium reached, the same object while the step is remembered.
+            The equilibrium reached, the same object as long as the step is remembered.
 
         Raises:
-            ValueError: As the solver; the memo stays as it was.
+            ValueError: As the solver; the memo is left unchanged.
         """
-        numbers = self._solver.check_command(equilibrium, *command)
+        numbers = self._solver.check_command(equilibrium, *args, **kwargs)
         key = equilibrium.block.tobytes(), numbers
         reached = self._reached.get(key)
         if reached is not None:
             self._reached.move_to_end(key)
             self._hits += 1
             return reached
-        reached = self._reached[key] = self._solver.step(equilibrium, *command)
+        reached = self._reached[key] = self._solver.step(equilibrium, *args, **kwargs)
         self._misses += 1
         if len(self._reached) > self._capacity:
             self._reached.popitem(last=False)
         return reached
 
     def clear(self) -> None:
-        """Forget all steps and start the statistics anew."""
+        """Forget all steps and reset the statistics."""
         self._reached: OrderedDict[tuple[bytes, tuple[float, ...]], StateT] = OrderedDict()
         self._hits = self._misses = 0
 
     @property
     def statistics(self) -> MemoStatistics:
-        """Use since the memo was made or cleared."""
+        """Hits, misses and size since the memo was created or cleared."""
         return MemoStatistics(self._hits, self._misses, len(self._reached), self._capacity)

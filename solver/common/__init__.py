@@ -1,1 +1,1 @@
-"""What the solvers in the plane and in space share."""
+"""Parts shared by the solvers in the plane and in space."""

@@ -1,77 +1,74 @@
-"""Many robots alike, each in a scene of its own, moved by one call of the kernel."""
+"""Base class of batches: many equal robots, each in its own scene, moved by one call of the kernel."""
 
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from threading import Lock
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from solver.common.checks import check_clear, check_core, check_scene
-from solver.common.equilibrium import BaseEquilibrium
+from solver.common.checks import check_clear, check_core, check_memory, check_scene
+from solver.common.equilibrium import BaseEquilibrium, RobotT_co
+from solver.common.exclusive import ExclusiveUse
 from solver.common.geometry import touching_gaps
 from solver.common.layout import Layout, Model
+from solver.common.robot import AnyRobot
 from solver.common.scene import MAX_OBSTACLES, Scene
 from solver.common.status import Status
-from solver.common.validation import LARGEST, array, instance, positive, sequence, shown, whole
+from solver.common.validation import (
+    LARGEST,
+    check_array,
+    check_instance,
+    check_positive,
+    check_sequence,
+    check_whole,
+    shown,
+)
+
+EquilibriumT_co = TypeVar("EquilibriumT_co", bound=BaseEquilibrium[AnyRobot], covariant=True)
+Kernel = Any  # a batch or a scene of the kernel, whose classes for the plane and for space share no base
 
 MAX_PULL_STEPS = 100_000  # of a trial pull
 
 
-class _Turn:
-    """Held by the thread that uses a batch; another that tries meanwhile is refused before it has changed anything."""
+class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
+    """Moves many robots at once, each with results bit-identical to those of its solver.
 
-    def __init__(self) -> None:
-        self._lock = Lock()
+    Unlike a solver, a batch keeps the present equilibria, as rows of arrays that are written in place.
 
-    def __enter__(self) -> None:
-        if not self._lock.acquire(blocking=False):
-            raise RuntimeError("the batch is in use by another thread; give each thread a batch of its own")
-
-    def __exit__(self, *error: object) -> None:
-        self._lock.release()
-
-
-class BaseBatch(ABC):
-    """Moves many robots at once; each is moved as its solver would, bit for bit.
-
-    Unlike the solver it keeps the present equilibria, as rows of arrays that are written in place.
-
-    One thread uses a batch at a time: a call while another thread is in one raises RuntimeError and changes nothing.
-    Ctrl-C, like any signal whose handler raises, ends a call within a fraction of a second, between two robots. Those
-    that have moved by then keep their new blocks, statuses and counts, the others are where they were, and
-    :attr:`commands` holds the new commands of all. After a :meth:`rest` cut short, none of its robots moves until it is
-    called again.
+    A batch is for one thread at a time: a call during another thread's raises RuntimeError and changes nothing. Ctrl-C,
+    like any signal whose handler raises, ends a call within a fraction of a second, between two robots. Those that have
+    moved by then keep their new blocks, statuses and counts, the others stay where they were, and :attr:`commands`
+    holds the new commands of all. After an interrupted :meth:`rest`, its robots do not move until it is repeated.
 
     Attributes:
-        blocks: Equilibria, ``(N, size)``; :attr:`layout` tells where their numbers stand.
-        statuses: How the last step of each ended, values of :class:`solver.Status`, ``(N,)``.
+        blocks: Equilibria, ``(N, size)``, in the memory layout of :attr:`layout`.
+        statuses: How the last step of each robot ended, values of :class:`solver.Status`, ``(N,)``.
         iterations: Newton iterations of these steps, ``(N,)``.
         factorizations: Factorisations of the Hessian in these steps, ``(N,)``.
-        commands: Cable displacements and length each is moved to, ``(N, cables + 1)`` [mm].
+        commands: Cable displacements and length that each robot is moved to, ``(N, cables + 1)`` [mm].
 
     Args:
-        robot: What all robots are.
+        robot: The robot that all of them are.
         count: Number N of robots.
-        obstacles: Number of obstacles of every scene.
-        threads: Threads that share the work; the answer does not depend on them.
+        obstacles: Number of obstacles in every scene.
+        threads: Threads that share the work; results do not depend on their number.
 
     Raises:
-        ValueError: If a number is out of range, or so many robots do not fit into memory.
-        TypeError: If the robot is something else.
+        ValueError: If a number is out of range, or the robots do not fit into memory.
+        TypeError: If the robot is not one of the batch's space.
     """
 
     model: ClassVar[Model]
     robot_kind: ClassVar[type]
 
-    def __init__(self, robot: Any, count: int, obstacles: int, threads: int = 1) -> None:
+    def __init__(self, robot: RobotT_co, count: int, obstacles: int, threads: int = 1) -> None:
         check_scene(robot, self.robot_kind, Scene(), self.model)
-        self.robot, self.count = robot, whole("count", count, 1, 2**31 - 1)
-        obstacles = whole("obstacles", obstacles, 0, MAX_OBSTACLES)
-        threads = whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "; more do not help")
+        self.robot, self.count = robot, check_whole("count", count, 1, 2**31 - 1)
+        obstacles = check_whole("obstacles", obstacles, 0, MAX_OBSTACLES)
+        threads = check_whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "more do not help")
         self.layout = self._make_layout(obstacles)
-        _check_memory(self.count, self.layout.size)
+        check_memory(self.count, self.layout.size)
         self.blocks = np.zeros((self.count, self.layout.size))
         self.statuses = np.zeros(self.count, np.int64)
         self.iterations = np.zeros(self.count, np.int64)
@@ -80,10 +77,10 @@ class BaseBatch(ABC):
         self.commands = np.zeros((self.count, self.model.cables + 1))
         self._kernel_batch = self._make_kernel(obstacles, threads)
         self._all = list(range(self.count))
-        self._turn = _Turn()
-        self._clear: Scene | None = None  # the scene last found to leave the straight robot clear
-        self._straight: np.ndarray | None = None  # points of the straight robot, when they are first asked for
-        self._unrested = set(self._all)  # must be put at rest before they move
+        self._exclusive = ExclusiveUse()
+        self._clear: Scene | None = None  # last scene found to leave the straight robot clear
+        self._straight: np.ndarray | None = None  # points of the straight robot, computed on first use
+        self._unrested = set(self._all)  # must be brought to rest before they move
         most = robot.cable_limit_mm
         least = 0.0 if self.model.cables == 1 else -most
         self._low = np.array(self.model.cables * [least] + [robot.shortest_mm])
@@ -92,61 +89,58 @@ class BaseBatch(ABC):
 
     @abstractmethod
     def _make_layout(self, obstacles: int) -> Layout:
-        """The layout of a block."""
+        """Return the memory layout of a block."""
 
     @abstractmethod
-    def _make_kernel(self, obstacles: int, threads: int) -> Any:
-        """The robots in the kernel."""
+    def _make_kernel(self, obstacles: int, threads: int) -> Kernel:
+        """Return the kernel's batch."""
 
     @abstractmethod
-    def _kernel_obstacles(self, scene: Scene) -> Any:
-        """Obstacles as the kernel takes them."""
+    def _kernel_obstacles(self, scene: Scene) -> Kernel:
+        """Return the obstacles of a scene as the kernel takes them."""
 
     @abstractmethod
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> BaseEquilibrium:
-        """The result of a solve."""
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> EquilibriumT_co:
+        """Return the equilibrium of a block."""
 
     @abstractmethod
     def _straight_points(self) -> np.ndarray:
-        """The points of the straight robot that can touch, ``(p, k, d)`` [mm]."""
+        """Return the points of the straight robot that can touch, ``(p, k, d)`` [mm]."""
 
     def assign(self, index: int, scene: Scene) -> None:
-        """Put a robot among other obstacles; it must be put at rest, by :meth:`rest`, before it moves.
+        """Assign a scene to a robot, which must then be brought to rest by :meth:`rest` before it moves.
 
-        The obstacles that it is among already change nothing.
+        A scene equal to the robot's present one changes nothing.
 
         Raises:
-            ValueError: As :class:`solver.Solver`, or if the scene has not as many obstacles as the batch was made for;
+            ValueError: As :class:`solver.Solver`, or if the scene does not have the batch's number of obstacles;
                 nothing has changed then.
-            TypeError: If ``scene`` is something else.
+            TypeError: If ``scene`` is not a scene.
         """
-        index = self._index(index)
-        instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+        index = self._check_index(index)
+        check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
         if scene == self._scenes[index]:
             return
         check_scene(self.robot, self.robot_kind, scene, self.model)
         if len(scene) != self.layout.obstacles:
-            raise ValueError(
-                f"scene has {len(scene)} obstacles; a scene of this batch must have as many obstacles as it was made "
-                f"for, {self.layout.obstacles}"
-            )
+            raise ValueError(f"scene has {len(scene)} obstacles; each of the batch's has {self.layout.obstacles}")
         check_core(self.robot, scene)
         if scene is not self._clear:
             check_clear(self.robot, scene, self._straight_gaps(scene))
         compiled = self._kernel_obstacles(scene)
-        with self._turn:
+        with self._exclusive:
             self._kernel_batch.set_obstacles(index, compiled)
             self._scenes[index] = scene
             self._unrested.add(index)
 
     def leaves_clear(self, scene: Scene) -> bool:
-        """Whether no obstacle of a scene overlaps the straight robot.
+        """Return whether no obstacle of a scene overlaps the straight robot.
 
         Raises:
-            ValueError: If an obstacle is one of another space, or names a node that the robot does not have.
-            TypeError: If ``scene`` is something else.
+            ValueError: If an obstacle is of another space, or names a node that the robot does not have.
+            TypeError: If ``scene`` is not a scene.
         """
-        instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+        check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
         clear = bool((self._straight_gaps(scene) >= 0).all())
         self._clear = scene if clear else None
         return clear
@@ -155,71 +149,69 @@ class BaseBatch(ABC):
         """Make some robots straight and unactuated again.
 
         Raises:
-            ValueError: If one is not there, named twice or not assigned to a scene; nothing has changed then.
+            ValueError: If an index is out of range or repeated, or a robot has no scene; nothing has changed then.
         """
-        which = self._indices(robots)
-        for robot in which:
-            self.scene(robot)
-        with self._turn:
-            self._unrested.update(which)
-            self.blocks[which] = 0.0
-            self.blocks[which, self.layout.length.at] = self.robot.length_mm
-            self.commands[which] = 0.0
-            self.commands[which, -1] = self.robot.length_mm
-            self._move(which)
-            self._unrested.difference_update(which)
+        indices = self._check_assigned(robots)
+        with self._exclusive:
+            self._unrested.update(indices)
+            self.blocks[indices] = 0.0
+            self.blocks[indices, self.layout.length.at] = self.robot.length_mm
+            self.commands[indices] = 0.0
+            self.commands[indices, -1] = self.robot.length_mm
+            self._move(indices)
+            self._unrested.difference_update(indices)
 
     def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
         """Move the cables of all robots, or of some, as far as tension and obstacles allow.
 
         Args:
             cable_mm: Commanded cable displacement of each of them, ``(k,)``, in space ``(k, 2)`` [mm].
-            robots: Which; ``None`` for all.
+            robots: Indices of the robots; ``None`` for all.
 
         Raises:
-            ValueError: If a command or a length in :attr:`blocks` is out of range, or a robot is not there, named twice
-                or not at rest since it was put among other obstacles; nothing has moved then.
+            ValueError: If a command or a length in :attr:`blocks` is out of range, an index is out of range or
+                repeated, or a robot was not brought to rest in its scene; nothing has moved then.
         """
-        which = self._all if robots is None else self._indices(robots)
+        indices = self._all if robots is None else self._check_indices(robots)
         cables = self.model.cables
-        shape = (len(which),) if cables == 1 else (len(which), cables)
-        commands = array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
-        with self._turn:
-            self._check_rested(which)
-            self._check_lengths(which)
-            self.commands[which, :-1] = commands.reshape(-1, cables)
-            self._move(which)
+        shape = (len(indices),) if cables == 1 else (len(indices), cables)
+        commands = check_array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
+        with self._exclusive:
+            self._check_rested(indices)
+            self._check_lengths(indices)
+            self.commands[indices, :-1] = commands.reshape(-1, cables)
+            self._move(indices)
 
-    def move(self, which: int | slice | list[int]) -> None:
-        """Move one robot, some or all to their commands, which must be in range.
+    def move(self, robots: int | slice | list[int]) -> None:
+        """Move one robot, some or all to their :attr:`commands`, which must be in range.
 
         Raises:
-            ValueError: If a robot is not there, named twice or not at rest since it was put among other obstacles;
+            ValueError: If an index is out of range or repeated, or a robot was not brought to rest in its scene;
                 nothing has moved then.
         """
-        if isinstance(which, slice):
-            robots = self._all[which]
-        elif isinstance(which, list):
-            robots = self._indices(which)
+        if isinstance(robots, slice):
+            indices = self._all[robots]
+        elif isinstance(robots, list):
+            indices = self._check_indices(robots)
         else:
-            robots = [self._index(which)]
-        with self._turn:
-            self._check_rested(robots)
-            self._move(robots)
+            indices = [self._check_index(robots)]
+        with self._exclusive:
+            self._check_rested(indices)
+            self._move(indices)
 
     def probe(self, commands: np.ndarray) -> np.ndarray:
-        """The equilibria that all robots would move to, ``(N, size)``; they stay where they are.
+        """Return the equilibria that all robots would move to, ``(N, size)``, without moving them.
 
         Args:
-            commands: As :attr:`commands`.
+            commands: Commands like :attr:`commands`.
 
         Raises:
-            ValueError: If a command or a length in :attr:`blocks` is out of range, or a robot is not at rest since it
-                was put among other obstacles.
+            ValueError: If a command or a length in :attr:`blocks` is out of range, or a robot was not brought to rest
+                in its scene.
         """
         bound = f"{self._bound}, and lengths from {self._low[-1]:.6g} to {self._high[-1]:.6g}"
-        commands = array("commands", commands, self.commands.shape, self._low, self._high, bound)
-        with self._turn:
+        commands = check_array("commands", commands, self.commands.shape, self._low, self._high, bound)
+        with self._exclusive:
             self._check_rested(self._all)
             self._check_lengths(self._all)
             blocks, scratch = self.blocks.copy(), [np.zeros(self.count, np.int64) for _ in range(3)]
@@ -227,13 +219,13 @@ class BaseBatch(ABC):
         return blocks
 
     def optimality(self) -> np.ndarray:
-        """How well the present equilibria meet their conditions, rows as :class:`solver.Optimality`, ``(N, 3)``.
+        """Return the optimality residuals of the present equilibria, in rows as :class:`solver.Optimality`, ``(N, 3)``.
 
         Raises:
-            ValueError: If a robot is not at rest since it was put among other obstacles.
+            ValueError: If a robot was not brought to rest in its scene.
         """
         found = np.zeros((self.count, 3))
-        with self._turn:
+        with self._exclusive:
             self._check_rested(self._all)
             self._kernel_batch.optimality(self.blocks, found)
         return found
@@ -247,95 +239,99 @@ class BaseBatch(ABC):
         directions: np.ndarray | None = None,
         obstacle: int | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Whether pulling some robots steadily from rest gets each to a contact force, and the force it gets to.
+        """Return whether a steady pull from rest brings each robot to a contact force, and the force it reaches.
 
-        No step may end in anything but ``CONVERGED``.
+        A pull whose steps do not all end in ``CONVERGED`` does not count.
 
         Args:
-            robots: Which, assigned to their scenes; their states are left alone.
-            forces: Force for each, ``(k,)`` [N].
-            increment_mm: Cable displacement of a step, at least a hundred thousandth of the bound [mm].
+            robots: Indices of robots with scenes; their states are not changed.
+            forces: Force for each robot, ``(k,)`` [N].
+            increment_mm: Cable displacement of a step, at least a hundred thousandth of ``limit_mm`` [mm].
             limit_mm: Bound on the cable displacement, at most ``robot.max_cable_mm`` [mm].
             directions: Displacements of the cables per millimetre of pull, at most 1 in size, in the plane not
                 negative, ``(k, cables)``; ``None`` for ones.
-            obstacle: The obstacle whose contact force is meant; ``None`` for all together.
+            obstacle: Index of the obstacle whose contact force counts; ``None`` for the sum over all.
 
         Returns:
             ``(k,)`` bool, and the contact force on each robot at the end of its pull, ``(k, d)`` [N].
 
         Raises:
-            ValueError: If a number is out of range, or a robot is not there, named twice or not assigned to a scene.
+            ValueError: If a number or an index is out of range, an index is repeated, or a robot has no scene.
         """
-        which = self._indices(robots)
-        for robot in which:
-            self.scene(robot)
-        count, most = len(which), self.robot.cable_limit_mm
-        forces = array("forces", forces, (count,), 0.0, LARGEST, "finite and not negative")
-        limit = positive("limit_mm", limit_mm, high=most)
-        increment = positive("increment_mm", increment_mm, limit / MAX_PULL_STEPS, LARGEST)
+        indices = self._check_assigned(robots)
+        count, most = len(indices), self.robot.cable_limit_mm
+        forces = check_array("forces", forces, (count,), 0.0, LARGEST, "finite and not negative")
+        limit = check_positive("limit_mm", limit_mm, high=most)
+        increment = check_positive("increment_mm", increment_mm, limit / MAX_PULL_STEPS, LARGEST)
         given = np.ones((count, self.model.cables)) if directions is None else directions
         least = 0.0 if self.model.cables == 1 else -1.0
-        given = array("directions", given, (count, self.model.cables), least, 1.0, f"from {least:g} to 1")
-        target = -1 if obstacle is None else whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
+        given = check_array("directions", given, (count, self.model.cables), least, 1.0, f"from {least:g} to 1")
+        target = -1 if obstacle is None else check_whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
         reached = np.zeros((count, self.model.space))
         length = self.robot.length_mm
-        with self._turn:
+        with self._exclusive:
             found = self._kernel_batch.ramps_reach_forces(
-                which, forces, target, given, increment, limit, length, reached
+                indices, forces, target, given, increment, limit, length, reached
             )
         return np.array(found, bool), reached
 
     def scene(self, index: int) -> Scene:
-        """The obstacles a robot is among.
+        """Return the scene of a robot.
 
         Raises:
-            ValueError: If it has not been assigned to a scene.
+            ValueError: If none was assigned.
         """
-        scene = self._scenes[self._index(index)]
+        scene = self._scenes[self._check_index(index)]
         if scene is None:
-            raise ValueError(f"robot {index} has not been assigned to a scene; call assign({index}, scene)")
+            raise ValueError(f"robot {index} has no scene; call assign({index}, scene)")
         return scene
 
-    def equilibrium(self, index: int) -> Any:
-        """A robot's present equilibrium, on its own.
+    def equilibrium(self, index: int) -> EquilibriumT_co:
+        """Return the present equilibrium of a robot.
 
         Raises:
-            ValueError: If it is not at rest since it was put among other obstacles, or its block is none.
+            ValueError: If the robot was not brought to rest in its scene, or its block is no equilibrium.
         """
-        with self._turn:
+        with self._exclusive:
             return self._equilibrium(index)
 
-    def _equilibrium(self, index: int) -> Any:
+    def _equilibrium(self, index: int) -> EquilibriumT_co:
         scene = self.scene(index)
         self._check_rested([index])
         work = int(self.iterations[index]), int(self.factorizations[index])
         return self._make_equilibrium(scene, self.blocks[index].copy(), Status(self.statuses[index]), *work)
 
-    def _index(self, index: int) -> int:
+    def _check_index(self, index: object) -> int:
         if type(index) is int and 0 <= index < self.count:
             return index
-        return whole("the index of a robot", index, 0, self.count - 1, f"; the batch has {self.count} robots")
+        return check_whole("robot index", index, 0, self.count - 1, f"the batch has {self.count} robots")
 
-    def _indices(self, robots: Sequence[int]) -> list[int]:
-        """Indices of robots, each once."""
-        which = list(map(self._index, sequence("robots", robots, "a list of indices")))
-        if len(set(which)) != len(which):
+    def _check_indices(self, robots: Sequence[int]) -> list[int]:
+        """Return indices of robots, each named once."""
+        indices = list(map(self._check_index, check_sequence("robots", robots, "a list of indices")))
+        if len(set(indices)) != len(indices):
             raise ValueError(f"robots is {shown(robots)}; it must name each robot once")
-        return which
+        return indices
+
+    def _check_assigned(self, robots: Sequence[int]) -> list[int]:
+        """Return indices of robots that have scenes, each named once."""
+        indices = self._check_indices(robots)
+        for robot in indices:
+            self.scene(robot)
+        return indices
 
     def _check_rested(self, robots: list[int]) -> None:
-        """Refuse robots that another scene waits for."""
+        """Check that robots were brought to rest in their scenes."""
         if not self._unrested:
             return
         for robot in self._unrested.intersection(robots):
             self.scene(robot)
             raise ValueError(
-                f"robot {robot} was put among other obstacles, or its rest was cut short; call rest([{robot}]) before "
-                "it moves"
+                f"robot {robot} has a new scene, or its rest was interrupted; call rest([{robot}]) before it moves"
             )
 
     def _check_lengths(self, robots: list[int]) -> None:
-        """Refuse blocks that someone has written another length into, or what is none."""
+        """Check the lengths in blocks, which users may have written to."""
         lengths = self.blocks[:, self.layout.length.at]
         lengths = lengths if robots is self._all else lengths[robots]
         low, high = self._low[-1], self._high[-1]
@@ -353,15 +349,4 @@ class BaseBatch(ABC):
         self._kernel_batch.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
 
 
-def _check_memory(count: int, size: int) -> None:
-    """Refuse more robots than their blocks fit into memory.
-
-    Raises:
-        ValueError: Naming both.
-    """
-    needed, there = 8 * count * size, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > there:
-        raise ValueError(
-            f"count is {count}; their blocks need {needed / 1e9:.3g} GB and this machine has {there / 1e9:.3g} GB: "
-            f"make batches of at most {there // (8 * size)}"
-        )
+BaseBatch = RobotBatch[AnyRobot, BaseEquilibrium[AnyRobot]]  # for code that serves both the plane and space

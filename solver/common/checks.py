@@ -1,6 +1,7 @@
-"""Checks of robots, scenes and equilibria before they are given to the kernel."""
+"""Checks of robots, scenes and equilibria before they reach the kernel."""
 
 import math
+import os
 
 import numpy as np
 
@@ -8,13 +9,13 @@ from solver.common.equilibrium import BaseEquilibrium
 from solver.common.layout import Model
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
-from solver.common.validation import instance, shown
+from solver.common.validation import check_instance, shown
 
 SPRINGS = (1e-10, 1e10)  # stiffness of an obstacle's spring, over EI/L³ of the robot
 
 
 def check_core(robot: AnyRobot, scene: Scene) -> None:
-    """Refuse obstacles that could slip through an edge of the robot: those with no point deeper than half an edge.
+    """Check that no obstacle can slip through an edge of the robot: each needs a point deeper than half an edge.
 
     Raises:
         ValueError: Naming the obstacle, its inner radius and what the robot needs.
@@ -31,7 +32,7 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
 
 
 def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
-    """Refuse obstacles that overlap the straight robot, whose gaps are given, ``(m, p, k)``.
+    """Check that no obstacle overlaps the straight robot, whose gaps are given, ``(m, p, k)``.
 
     Raises:
         ValueError: Naming the obstacle, the node and the depth.
@@ -43,14 +44,15 @@ def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
 
 
 def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None:
-    """Refuse a robot and a scene that a solver has no use for, or that are out of all proportion to each other.
+    """Check that robot and scene are of the solver's space, and in proportion to each other.
 
     Raises:
-        TypeError: If they are not of the classes asked for.
+        TypeError: If they are not of the required classes.
         ValueError: Naming the obstacle, the value and the bound.
     """
-    instance("robot", robot, kind, "robots of the plane are solver.Robot, those of space solver.spatial.SpatialRobot")
-    instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
+    remedy = "robots of the plane are solver.Robot, those of space solver.spatial.SpatialRobot"
+    check_instance("robot", robot, kind, remedy)
+    check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
     for obstacle in scene:
         if obstacle.space != model.space:
             names = ("the plane", "solver.spatial") if model.space == 3 else ("space", "solver")
@@ -70,16 +72,30 @@ def _check_spring(robot: AnyRobot, spring: np.ndarray) -> None:
         )
 
 
-def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium, kind: type) -> None:
-    """Refuse an equilibrium of another robot or scene.
+def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium[AnyRobot], kind: type) -> None:
+    """Check that an equilibrium is one of this robot and scene.
 
     Raises:
         ValueError: Saying which of them differs.
-        TypeError: If it is something else.
+        TypeError: If it is not an equilibrium.
     """
     if not isinstance(equilibrium, kind):
-        instance("equilibrium", equilibrium, kind, "step from rest() of this solver")
+        check_instance("equilibrium", equilibrium, kind, "step from rest() of this solver")
     if equilibrium.robot is not robot and equilibrium.robot != robot:
         raise ValueError("the equilibrium is of another robot; step from rest() of this solver")
     if equilibrium.scene is not scene and equilibrium.scene != scene:
         raise ValueError("the equilibrium is of another scene; step from rest() of this solver")
+
+
+def check_memory(count: int, size: int) -> None:
+    """Check that the blocks of all robots fit into memory.
+
+    Raises:
+        ValueError: Naming the count and how many fit.
+    """
+    needed, available = 8 * count * size, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > available:
+        raise ValueError(
+            f"count is {count}; their blocks need {needed / 1e9:.3g} GB and this machine has {available / 1e9:.3g} GB: "
+            f"make batches of at most {available // (8 * size)}"
+        )

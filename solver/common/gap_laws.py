@@ -1,4 +1,4 @@
-"""Gap laws that the plane and space share: the signed clearance of a point from an obstacle, in CasADi."""
+"""Gap laws shared by the plane and space: the signed clearance of a point from an obstacle, in CasADi."""
 
 import math
 from collections.abc import Callable
@@ -9,37 +9,38 @@ import casadi as ca
 
 
 def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a circle or a sphere ``shape = (center, r)``: ``(|p − c|² − r²) / 2r``."""
+    """Return the gap to a circle or a sphere ``shape = (center, r)``: ``(|p − c|² − r²) / 2r``."""
     return (ca.sumsqr(point - shape[:-1]) - shape[-1] ** 2) / (2 * shape[-1])
 
 
 def half_plane_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a half-plane or a half-space ``shape = (n, offset)``, unit outward normal n: ``n·p − offset`` (eq. 12)."""
+    """Return the gap to a half-plane or half-space ``shape = (n, offset)`` of outward normal n: ``n·p − offset``."""
     return ca.dot(point, shape[:-1]) - shape[-1]
 
 
 def capsule_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a capsule ``shape = (start, end, r)``: that of the ball about the nearest point of its axis."""
+    """Return the gap to a capsule ``shape = (start, end, r)``: that of the ball about the nearest axis point."""
     start, axis = shape[: point.numel()], shape[point.numel() : -1] - shape[: point.numel()]
     fraction = ca.dot(point - start, axis) / ca.sumsqr(axis)
     nearest = start + ca.fmin(ca.fmax(fraction, 0), 1) * axis
     return circle_gap(point, ca.vertcat(nearest, shape[-1]))
 
 
-def _square_distance(point: ca.SX, start: ca.SX, end: ca.SX) -> ca.SX:
+def square_distance(point: ca.SX, start: ca.SX, end: ca.SX) -> ca.SX:
+    """Return the squared distance of a point from the line segment between two others."""
     along = end - start
     fraction = ca.dot(point - start, along) / ca.fmax(ca.sumsqr(along), TINY)
     return ca.sumsqr(point - start - ca.fmin(ca.fmax(fraction, 0), 1) * along)
 
 
 class GapLaw(NamedTuple):
-    """One kind of obstacle.
+    """Gap law of one kind of obstacle.
 
     Attributes:
-        kind: Its name.
-        gap: The gap as a function of (point, shape), with unit slope on the surface.
-        size: How many numbers its shape has.
-        growth: Those of them that grow as much as the obstacle grows outwards.
+        kind: Name of the kind.
+        gap: Gap as a function of (point, shape), with unit slope on the surface.
+        size: Number of shape parameters.
+        growth: Indices of the shape parameters that grow as much as the obstacle grows outwards.
         space: Dimension of the points.
     """
 
@@ -56,9 +57,9 @@ SERIES_TERMS = 12  # of the series below: to the last digit for a quarter turn
 
 
 def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
-    """``sin h / h`` and ``cos h`` in ``square = h²``, smooth at zero, by the power series of the first for |h| ≤ π/2.
+    """Return ``sin h / h`` and ``cos h`` of ``square = h²``, smooth at zero, for |h| ≤ π/2.
 
-    The second is ``d(h sinc h)/dh``, with the slope of the series in ``square``.
+    The first is a power series. The second is ``d(h sinc h)/dh``, with the slope of that series in ``square``.
     """
     sinc = slope = 0 * square
     for k in reversed(range(SERIES_TERMS)):
@@ -69,7 +70,7 @@ def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
 
 @lru_cache(maxsize=64)
 def gap_function(law: GapLaw) -> ca.Function:
-    """``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` for one kind of obstacle, and likewise in space."""
+    """Return ``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` of one kind of obstacle, and likewise in space."""
     point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
     gap = law.gap(point, shape)
     hessian, gradient = ca.hessian(gap, point)
@@ -79,12 +80,12 @@ def gap_function(law: GapLaw) -> ca.Function:
 
 
 def clearance_function(law: GapLaw) -> ca.Function:
-    """``(p, shape) → c`` alone, where the slopes are not wanted."""
+    """Return ``(p, shape) → c`` of one kind of obstacle, where the slopes are not needed."""
     point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
     return ca.Function(f"ccr_{law.kind}_clearance", [point, shape], [ca.cse(law.gap(point, shape))])
 
 
 def gaps_of(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
-    """Gaps of the columns to an obstacle."""
+    """Return the gaps of points, given as columns, to an obstacle."""
     count = points.shape[1]
     return gap_function(law).map(count)(points, ca.repmat(shape, 1, count))[0, :].T

@@ -6,17 +6,19 @@ from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
 
 
-def divided(lines: np.ndarray, between: int) -> np.ndarray:
-    """Lines ``(p, n+1, d)`` with as many points between every two, which divide the straight line evenly."""
+def subdivide(lines: np.ndarray, between: int) -> np.ndarray:
+    """Return lines ``(p, n+1, d)`` with ``between`` evenly spaced points added between every two."""
     segments = lines.shape[1] - 1
-    place = np.arange(segments * (between + 1) + 1) / (between + 1)
-    node = np.minimum(place.astype(int), segments - 1)
-    fraction = (place - node)[:, None]
+    position = np.arange(segments * (between + 1) + 1) / (between + 1)
+    node = np.minimum(position.astype(int), segments - 1)
+    fraction = (position - node)[:, None]
     return np.asarray((1 - fraction) * lines[:, node] + fraction * lines[:, node + 1])
 
 
 def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
-    """Which of these points can touch each obstacle, ``(m, lines, positions)`` bool: all, or those of its nodes.
+    """Return which points of a robot can touch which obstacle, ``(m, lines, positions)`` bool.
+
+    These are all points, or those of the nodes that the obstacle names.
 
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
@@ -30,7 +32,7 @@ def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
 
 
 def touching_gaps(robot: AnyRobot, scene: Scene, points: np.ndarray) -> np.ndarray:
-    """Gaps of the points of a robot ``(p, k, d)``, infinite where they cannot touch, ``(m, p, k)`` [mm].
+    """Return the gaps of points ``(p, k, d)`` of a robot, infinite where they cannot touch, ``(m, p, k)`` [mm].
 
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.

@@ -1,17 +1,23 @@
-"""Steps and options of the reference solvers, which hand the node-coordinate problem to IPOPT."""
+"""Step sizes and IPOPT options of the reference solvers.
+
+Cable displacements are given over the cable offset a, positions over the robot's longest length L.
+"""
 
 from typing import Any
 
-# Displacements of the cable are over its offset a, places over the length L of the robot at its longest.
-LARGEST_STEP, SMALLEST_STEP = 0.03125, 0.00375  # of one solve, and of its last try [a]
+import casadi as ca
+
+LARGEST_STEP, SMALLEST_STEP = 0.03125, 0.00375  # of one solve, and of the last attempt [a]
 INSERTION = 11.25  # displacement that counts as much as an insertion by L [a]
 PRETENSION = 0.00625  # a touching robot is not slackened below it [a]
 SLACK = 1.25e-4  # below it a shear costs too little for IPOPT, and the robot is taken as free [a]
-TURN = 0.02  # unit of the angles of a robot with a sliding cable [rad]
+ANGLE_UNIT = 0.02  # of the disk angles of a rod [rad]
 RESOLUTION = 1.25e-7  # to which the command at the tension limit is found [a]
 MOVE_OFFSET, MOVE_SLOPE = 0.0028, 0.71  # a node that moves farther than offset + slope·|step| has left the branch [L]
 
-OPTIONS: dict[str, Any] = {
+Options = dict[str, Any]  # as CasADi nests them
+
+OPTIONS: Options = {
     "print_time": False,
     "ipopt": {
         "print_level": 0,
@@ -33,3 +39,9 @@ OPTIONS: dict[str, Any] = {
         "warm_start_mult_bound_push": 1e-9,
     },
 }
+
+
+def nlp_solver(problem: dict[str, ca.MX], options: Options, plugin: str = "ipopt") -> ca.Function:
+    """Return CasADi's solver of a nonlinear problem with unknowns x, parameters p, objective f and constraints g."""
+    symbols: dict[str, Any] = dict(problem)  # CasADi's own type for its values is private
+    return ca.nlpsol("reference", plugin, symbols, options)

@@ -4,22 +4,20 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from solver.common.gap_laws import GapLaw
+
 
 class NodeProblem(NamedTuple):
-    """Eq. 5 in node coordinates, symbolic.
+    """Eq. 5 or 13 in node coordinates, symbolic; built by ``node_problem`` of the planar and spatial formulations.
 
     Attributes:
-        unknowns: Backbone then cable points of nodes 1…n, then the displacements of the obstacles on springs, each as
-            x, y pairs, ``(4n + 2s,)`` [mm].
-        parameters: ``(l, L0, a, EI)``, the shapes of the obstacles, one after the other, and ``(kxx, kxy, kyy)`` of
-            those on springs.
+        unknowns: Points of backbone and cables at nodes 1…n, then displacements of the obstacles on springs [mm].
+        parameters: Cable displacements, length and robot constants, then the shapes of the obstacles, one after the
+            other, then the stiffness of their springs.
         objective: Sum of squared disk angles, and the energy of the springs over ``B = EI / 2 l0`` [rad²].
-        equalities: Zero when every segment has its shape, ``(3n,)`` [mm]. With a uniform cable: lengths of backbone,
-            cable and disk minus their values. With a sliding one, whose segments are arcs: length of the chord minus
-            its value, component of the chord along the bisector of the disks, length of the disk minus its value.
-        inequalities: Not negative, ``(k,)`` [mm]: with a sliding cable its slack, then what is left between the disks
-            of each segment on the cable's side, then on the other; then the gap of every point that can touch, but for
-            node 0, to every obstacle, ordered (obstacle, line, position).
+        equalities: Zero when every segment has its shape [mm].
+        inequalities: Not negative [mm]: limits of the robot itself, if any, then the gap of every point that can touch,
+            except node 0, to every obstacle, ordered (obstacle, line, position).
     """
 
     unknowns: ca.MX
@@ -30,18 +28,23 @@ class NodeProblem(NamedTuple):
 
 
 def norms(columns: ca.MX) -> ca.MX:
-    """Lengths of the columns."""
+    """Return the lengths of the columns."""
     return ca.sqrt(ca.sum1(columns**2))
 
 
-def divided(line: ca.MX, between: int) -> ca.MX:
-    """The points of a line with as many between every two."""
+def subdivide(line: ca.MX, between: int) -> ca.MX:
+    """Return the points of a line with ``between`` evenly spaced ones added between every two."""
     pieces = [line[:, :-1] + k / (between + 1) * (line[:, 1:] - line[:, :-1]) for k in range(between + 1)]
     return ca.horzcat(ca.reshape(ca.vertcat(*pieces), line.shape[0], -1), line[:, -1])
 
 
+def grow(law: GapLaw, shape: ca.MX, growth: ca.MX) -> ca.MX:
+    """Return the shape parameters of an obstacle that grew outwards by a length."""
+    return shape + growth * ca.DM([k in law.growth for k in range(law.size)])
+
+
 def first_derivatives(problem: NodeProblem) -> ca.Function:
-    """``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of a problem."""
+    """Return ``(unknowns, parameters) → ∇J, equalities, their Jacobian, inequalities, theirs`` of a problem."""
     outputs = [
         ca.gradient(problem.objective, problem.unknowns),
         problem.equalities,
@@ -53,11 +56,15 @@ def first_derivatives(problem: NodeProblem) -> ca.Function:
 
 
 def second_derivatives(problem: NodeProblem, change: ca.MX) -> ca.Function:
-    """Derivatives of the optimality conditions of a problem that was built with a change ``v`` of what it is told.
+    """Return the derivatives of the optimality conditions of a problem in its unknowns and in a change of parameters.
 
-    With the Lagrangian ``L = J − ν·equalities − λ·inequalities``, its conditions ``F = (L_z, equalities,
-    inequalities)`` and loads ``L_v``: ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The loads' slope in the
-    multipliers stands in ``F_v`` already.
+    The Lagrangian ``L = J − ν·equalities − λ·inequalities`` has the conditions ``F = (L_z, equalities, inequalities)``
+    and the loads ``L_v``; the result is ``(z, parameters, ν, λ) → F_z, F_v, L_v, L_vv``. The slope of the loads in the
+    multipliers is part of ``F_v`` already.
+
+    Args:
+        problem: The problem, built with the change.
+        change: The symbol ``v`` of the change, which is zero at the solution.
     """
     _, _, objective, equalities, inequalities = problem
     tensions, multipliers = ca.MX.sym("tensions", equalities.shape[0]), ca.MX.sym("multipliers", inequalities.shape[0])

@@ -1,4 +1,4 @@
-"""The base class of all obstacles, and how large one is."""
+"""Base class of all obstacles, and their extent."""
 
 import math
 from abc import ABC, abstractmethod
@@ -10,20 +10,31 @@ import numpy as np
 
 from solver import _kernel
 from solver.common.gap_laws import GapLaw
-from solver.common.validation import Matrix, Point, check_points, point, positive, sequence, shown, spring, whole
+from solver.common.validation import (
+    Matrix,
+    Point,
+    check_point,
+    check_points,
+    check_positive,
+    check_sequence,
+    check_spring,
+    check_whole,
+    refusal,
+    shown,
+)
 
 SHAPES = {shape.name.lower(): shape for shape in _kernel.Shape}
-FARTHEST = 100.0  # place or size of an obstacle, over the robot's longest length
+FARTHEST = 100.0  # position or size of an obstacle, over the robot's longest length
 MAX_NODES = 4097  # of a robot
 SHARPEST = 1e-9  # smallest radius of an obstacle's surface, over that length
 
 
 class Extent(NamedTuple):
-    """How large an obstacle is.
+    """Size of an obstacle.
 
     Attributes:
-        center: Centre of a disc or ball that holds it [mm].
-        radius: Radius of that disc [mm]; infinite for a wall.
+        center: Centre of a disc or ball that encloses it [mm].
+        radius: Radius of that disc or ball [mm]; infinite for a wall.
         inradius: Radius of the largest disc or ball inside it [mm]; infinite for a wall.
         min_curvature_radius: Smallest radius of curvature of the surface [mm]; infinite for a wall.
     """
@@ -39,39 +50,40 @@ class Obstacle(ABC):
     """A convex obstacle, fixed or on a spring.
 
     Attributes:
-        nodes: Node indices (base = 0) that can touch it; ``None`` for all.
+        nodes: Indices of the nodes that can touch it, the base being 0; ``None`` for all.
         spring: Stiffness of the spring it is mounted on, which lets it shift but not turn [N/mm]: one number, or a
-            symmetric matrix, in the plane ``((kxx, kxy), (kxy, kyy))``, kept as that. ``None`` for a fixed obstacle.
+            symmetric matrix, in the plane ``((kxx, kxy), (kxy, kyy))``; stored as a matrix. ``None`` for a fixed
+            obstacle.
 
     Raises:
         ValueError: If a node index is negative or repeated, or the spring's stiffness is not positive definite.
     """
 
     space: ClassVar[int] = 2  # dimension of its points
-    places: ClassVar[tuple[str, ...]] = ("center",)  # fields that are points, and move with it
-    lengths: ClassVar[tuple[str, ...]] = ("radius",)  # fields that are radii or sizes
+    point_fields: ClassVar[tuple[str, ...]] = ("center",)  # which move with it
+    size_fields: ClassVar[tuple[str, ...]] = ("radius",)
 
     nodes: tuple[int, ...] | None = None
     spring: float | Matrix | None = None
 
     def __post_init__(self) -> None:
         if self.spring is not None:
-            object.__setattr__(self, "spring", spring("spring", self.spring, self.space))
+            object.__setattr__(self, "spring", check_spring("spring", self.spring, self.space))
         if self.nodes is not None:
-            object.__setattr__(self, "nodes", _nodes(self.nodes))
-        for name in self.places:
-            object.__setattr__(self, name, point(name, getattr(self, name), self.space))
-        for name in self.lengths:
-            object.__setattr__(self, name, positive(name, getattr(self, name)))
+            object.__setattr__(self, "nodes", _check_nodes(self.nodes))
+        for name in self.point_fields:
+            object.__setattr__(self, name, check_point(name, getattr(self, name), self.space))
+        for name in self.size_fields:
+            object.__setattr__(self, name, check_positive(name, getattr(self, name)))
 
     @property
     @abstractmethod
     def law(self) -> GapLaw:
-        """The law of its gap."""
+        """Gap law of the obstacle."""
 
     @property
     def kind(self) -> str:
-        """Name of its gap law."""
+        """Name of the gap law."""
         return self.law.kind
 
     @property
@@ -82,37 +94,38 @@ class Obstacle(ABC):
     @property
     @abstractmethod
     def parameters(self) -> tuple[float, ...]:
-        """Its shape as the gap law in :mod:`solver.planar.formulation` takes it."""
+        """Parameters of the gap law."""
 
     @property
     @abstractmethod
     def extent(self) -> Extent:
-        """How large it is."""
+        """Size of the obstacle."""
 
     @abstractmethod
     def outline(self) -> np.ndarray:
-        """Points of its surface [mm].
+        """Return points of the surface [mm].
 
-        In the plane a closed polygon, ``(k, 2)``, or the surface point of a half-plane; in space a grid, ``(u, v, 3)``.
+        These are a closed polygon in the plane, ``(k, 2)``, or one point of a half-plane; in space a grid,
+        ``(u, v, 3)``.
         """
 
     @property
     def surface(self) -> np.ndarray:
-        """Points of its surface where its gap is no distance, ``(k, 2)`` [mm]; none where it is one."""
+        """Points of the surface, ``(k, 2)`` [mm], for shapes whose gap is no exact distance; empty for others."""
         return np.empty((0, self.space))
 
     def shifted(self, by: Iterable[float]) -> Self:
-        """The same obstacle elsewhere, by a shift [mm].
+        """Return the obstacle moved by a shift [mm].
 
         Raises:
             ValueError: If the shift is not as many finite numbers as there are dimensions.
         """
-        shift = point("by", by, self.space)
-        places: dict[str, Any] = {name: plus(getattr(self, name), shift) for name in self.places}
-        return replace(self, **places)
+        shift = check_point("by", by, self.space)
+        moved: dict[str, Any] = {name: _sum(getattr(self, name), shift) for name in self.point_fields}
+        return replace(self, **moved)  # fields of the subclass
 
     def check_proportion(self, length_mm: float) -> None:
-        """Refuse an obstacle too far from a robot of some length, or too large or too sharp beside it.
+        """Check that the obstacle is not too far, too large or too sharp for a robot of some length.
 
         Raises:
             ValueError: Naming the value and the bound.
@@ -123,11 +136,10 @@ class Obstacle(ABC):
             "solver's tolerance; use a HalfPlane, in space a HalfSpace, for a wall, or leave out what the robot cannot "
             "reach"
         )
-        for name, place in self._points():
-            if math.hypot(*place) > largest:
-                raise ValueError(
-                    f"{name} of {shown(self)} is {math.hypot(*place):.6g} mm from the base, beyond {remedy}"
-                )
+        for name, point in self._points():
+            distance = math.hypot(*point)
+            if distance > largest:
+                raise ValueError(f"{name} of {shown(self)} is {distance:.6g} mm from the base, beyond {remedy}")
         for name, size in self._radii():
             if size > largest:
                 raise ValueError(f"{name} of {shown(self)} is {size:.6g} mm, beyond {remedy}")
@@ -138,20 +150,20 @@ class Obstacle(ABC):
                 )
 
     def _points(self) -> list[tuple[str, Point]]:
-        """Its points and their names."""
-        return [(name, getattr(self, name)) for name in self.places]
+        """Return its points with their names."""
+        return [(name, getattr(self, name)) for name in self.point_fields]
 
     def _radii(self) -> list[tuple[str, float]]:
-        """Its radii and sizes and their names."""
-        return [(name, getattr(self, name)) for name in self.lengths]
+        """Return its radii and sizes with their names."""
+        return [(name, getattr(self, name)) for name in self.size_fields]
 
     def touchable(self, nodes: int) -> np.ndarray:
-        """Which of the nodes 0…n can touch it, ``(nodes,)`` bool.
+        """Return which of the nodes 0…n can touch it, ``(nodes,)`` bool.
 
         Raises:
             ValueError: If a named node does not exist.
         """
-        nodes = whole("nodes", nodes, 1, MAX_NODES)
+        nodes = check_whole("nodes", nodes, 1, MAX_NODES)
         if self.nodes is None:
             return np.ones(nodes, dtype=bool)
         if max(self.nodes) >= nodes:
@@ -161,40 +173,41 @@ class Obstacle(ABC):
         return np.asarray(np.isin(np.arange(nodes), self.nodes))
 
     def gap(self, points: np.ndarray) -> np.ndarray:
-        """Gaps of points ``(..., 2)``, in space ``(..., 3)`` [mm]; positive outside.
+        """Return the gaps of points ``(..., 2)``, in space ``(..., 3)`` [mm]; positive outside.
 
         Raises:
-            ValueError: If they are not finite or not of its space.
+            ValueError: If the points are not finite or not of its space.
         """
         return self.measure(check_points(points, self.space))[..., 0]
 
     def normal_at(self, points: np.ndarray) -> np.ndarray:
-        """Gradient of the gap at points, the outward unit normal on the surface, shaped as they are.
+        """Return the gradient of the gap at points, on the surface the outward unit normal, in their shape.
 
         Raises:
-            ValueError: If they are not finite or not of its space.
+            ValueError: If the points are not finite or not of its space.
         """
         return self.measure(check_points(points, self.space))[..., 1:]
 
     def measure(self, points: np.ndarray) -> np.ndarray:
-        """Gap and gradient at points that need no check, a contiguous array of floats, ``(..., d + 1)``."""
+        """Return gap and gradient at points, a contiguous array of floats that is not checked, ``(..., d + 1)``."""
         gaps = np.empty((*points.shape[:-1], self.space + 1))
         measure = _kernel.measure_gaps if self.space == 2 else _kernel.measure_spatial_gaps
         measure(SHAPES[self.kind], np.array(self.parameters), points, gaps)
         return gaps
 
 
-def plus(place: Point, shift: Point) -> Point:
-    """A point moved by a shift."""
-    return tuple(a + b for a, b in zip(place, shift, strict=True))
+def _sum(point: Point, shift: Point) -> Point:
+    """Return a point moved by a shift."""
+    return tuple(a + b for a, b in zip(point, shift, strict=True))
 
 
-def _nodes(nodes: Any) -> tuple[int, ...]:
-    wanted = "a tuple of node indices, (14,) for one; it must name at least one node, each once, from 0"
+def _check_nodes(nodes: object) -> tuple[int, ...]:
+    bound = "a tuple of node indices, (14,) for one; it must name at least one node, each once, from 0"
     try:
-        indices = tuple(whole("a node", node, 0, MAX_NODES - 1) for node in sequence("nodes", nodes, wanted))
+        entries = check_sequence("nodes", nodes, bound)
+        indices = tuple(check_whole("a node", node, 0, MAX_NODES - 1) for node in entries)
     except ValueError as error:
-        raise ValueError(f"nodes is {shown(nodes)}; it must be {wanted} to {MAX_NODES - 1}") from error
+        raise refusal("nodes", nodes, f"{bound} to {MAX_NODES - 1}") from error
     if not indices or len(set(indices)) != len(indices):
-        raise ValueError(f"nodes is {shown(nodes)}; it must be {wanted}")
+        raise refusal("nodes", nodes, bound)
     return indices

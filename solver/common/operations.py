@@ -1,17 +1,25 @@
-"""What is written once for a number and for an array of them; the bits are the same."""
+"""Scalar and array versions of the same operations, with bit-identical results."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+Value = float | np.ndarray
+
 
 class Operations(NamedTuple):
-    """Operations whose form for plain numbers is another than for arrays."""
+    """Operations that are written differently for floats, where they are several times faster, and for arrays.
 
-    minimum: Callable[[Any, Any], Any]
-    maximum: Callable[[Any, Any], Any]
-    where: Callable[[Any, Any, Any], Any]
+    Attributes:
+        minimum: Smaller of two values.
+        maximum: Larger of two values.
+        where: First value where a condition holds, else the second.
+    """
+
+    minimum: Callable[[Value, Value], Value]
+    maximum: Callable[[Value, Value], Value]
+    where: Callable[[bool | np.ndarray, Value, Value], Value]
 
 
 ARRAYS = Operations(np.minimum, np.maximum, np.where)

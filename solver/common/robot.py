@@ -1,24 +1,60 @@
-"""Checks of a robot that the plane and space share, and what both kinds of robot offer."""
+"""What robots of the plane and of space have in common, and the checks they share."""
 
 import math
 from collections.abc import Sequence, Sized
-from typing import Any, Protocol
+from typing import Protocol
 
-from solver.common.validation import SMALLEST, number, positive, sequence, shown, whole
+from solver.common.validation import SMALLEST, check_number, check_positive, check_sequence, check_whole, refusal
 
 RIGIDITIES = (1e-60, 1e60)  # that leave EI/L² and EI/2l0, and the squares of forces, normal numbers [N·mm²]
-OFFSETS = (1e-4, 10.0)  # over the longest length: nearer ones leave too few digits of a cable's share
+OFFSETS = (1e-4, 10.0)  # over the longest length: nearer cables leave too few digits of their share
 LEAST_TENSION = 1e-6  # a limit of tension, over EI/(aL): the robot cannot bend below it
-LEAST_CABLE = 1e-6  # the largest displacement, over a
-MAX_POINTS = 2**18  # that can touch: of all lines together
+LEAST_CABLE = 1e-6  # the largest cable displacement, over a
+MAX_POINTS = 2**18  # that can touch, on all lines together
 
 
 class AnyRobot(Protocol):
-    """What robots in the plane and in space have in common."""
+    """A robot of the plane or of space; see :class:`solver.Robot` for its fields."""
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the backbone at rest, L0 [mm]."""
+
+    @property
+    def shortest_mm(self) -> float:
+        """Shortest length of the backbone [mm]."""
+
+    @property
+    def longest_mm(self) -> float:
+        """Longest length of the backbone [mm]."""
 
     @property
     def segments(self) -> int:
         """Number of segments."""
+
+    @property
+    def offset_mm(self) -> float:
+        """Distance a of the cables from the backbone [mm]."""
+
+    @property
+    def rigidity(self) -> float:
+        """Flexural rigidity EI of the backbone [N·mm²]."""
+
+    @property
+    def max_tension(self) -> float:
+        """Cable tension the motor can hold [N]."""
+
+    @property
+    def max_cable_mm(self) -> float | None:
+        """Largest cable displacement as given [mm]."""
+
+    @property
+    def cable_limit_mm(self) -> float:
+        """``max_cable_mm`` with its default filled in [mm]."""
+
+    @property
+    def touch(self) -> tuple[str, ...]:
+        """Names of the lines whose points can touch obstacles."""
 
     @property
     def between(self) -> int:
@@ -26,7 +62,7 @@ class AnyRobot(Protocol):
 
     @property
     def lines_mm(self) -> Sized:
-        """Places on the disk of the lines of points that can touch [mm]."""
+        """Positions on the disk of the lines of points that can touch [mm]."""
 
     @property
     def positions(self) -> int:
@@ -34,54 +70,48 @@ class AnyRobot(Protocol):
 
     @property
     def edges_mm(self) -> Sequence[float]:
-        """Longest distance there can be between neighbouring points of each line [mm]."""
-
-    @property
-    def longest_mm(self) -> float:
-        """Longest length of the backbone [mm]."""
-
-    @property
-    def rigidity(self) -> float:
-        """Flexural rigidity EI of the backbone [N·mm²]."""
+        """Largest possible distance between neighbouring points of each line [mm]."""
 
 
-def check_numbers(robot: Any, lines: tuple[str, ...]) -> None:
-    """Refuse what no robot can have; its numbers become floats and ints, its ``touch`` a tuple, of some of these lines.
+def check_fields(robot: AnyRobot, lines: tuple[str, ...]) -> None:
+    """Check the fields that all robots have; numbers become floats and ints, ``touch`` a tuple of some of the lines.
 
     Raises:
         ValueError: Naming the value and the bound.
     """
     assign = object.__setattr__
     for name in ("length_mm", "offset_mm"):
-        assign(robot, name, positive(name, getattr(robot, name)))
-    assign(robot, "rigidity", positive("rigidity", robot.rigidity, *RIGIDITIES))
-    assign(robot, "segments", whole("segments", robot.segments, 2, 4096))
-    assign(robot, "between", whole("between", robot.between, 0, 256))
+        assign(robot, name, check_positive(name, getattr(robot, name)))
+    assign(robot, "rigidity", check_positive("rigidity", robot.rigidity, *RIGIDITIES))
+    assign(robot, "segments", check_whole("segments", robot.segments, 2, 4096))
+    assign(robot, "between", check_whole("between", robot.between, 0, 256))
     bound = "positive (math.inf lifts the limit)"
-    assign(robot, "max_tension", number("max_tension", robot.max_tension, SMALLEST, math.inf, bound))
-    wanted = f"a tuple of some of {lines}, each once, as ({lines[0]!r},)"
-    touch = sequence("touch", robot.touch, wanted)
+    assign(robot, "max_tension", check_number("max_tension", robot.max_tension, SMALLEST, math.inf, bound))
+    bound = f"a tuple of some of {lines}, each once, as ({lines[0]!r},)"
+    touch = check_sequence("touch", robot.touch, bound)
     named = all(isinstance(line, str) and line in lines for line in touch)
     if not touch or not named or len(set(touch)) != len(touch):
-        raise ValueError(f"touch is {shown(robot.touch)}; it must be {wanted}")
+        raise refusal("touch", robot.touch, bound)
     assign(robot, "touch", tuple(touch))
 
 
-def check_scale(robot: Any, longest: float) -> None:
-    """Refuse numbers that are out of all proportion to the robot's longest length.
+def check_proportions(robot: AnyRobot) -> None:
+    """Check offset and tension limit in proportion to the robot's longest length.
 
     Raises:
         ValueError: Naming the value and the bound.
     """
+    longest = robot.longest_mm
     low, high = (ratio * longest for ratio in OFFSETS)
-    number("offset_mm", robot.offset_mm, low, high, f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length")
+    bound = f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length"
+    check_number("offset_mm", robot.offset_mm, low, high, bound)
     least = LEAST_TENSION * robot.rigidity / (robot.offset_mm * longest)
     bound = f"at least {least:.6g}, {LEAST_TENSION} of EI/(a·L), to bend the robot at all (math.inf lifts the limit)"
-    number("max_tension", robot.max_tension, least, math.inf, bound)
+    check_number("max_tension", robot.max_tension, least, math.inf, bound)
 
 
-def check_points(robot: Any, count: int) -> None:
-    """Refuse more points that can touch than there is room for.
+def check_point_count(robot: AnyRobot, count: int) -> None:
+    """Check that the points that can touch are not too many.
 
     Raises:
         ValueError: Naming the numbers and the bound.
@@ -93,13 +123,13 @@ def check_points(robot: Any, count: int) -> None:
         )
 
 
-def check_cable(robot: Any, default: float) -> None:
-    """Fill in the largest displacement of a cable, and refuse one that is no number or too small to matter.
+def check_cable_limit(robot: AnyRobot, default: float) -> None:
+    """Fill in the largest cable displacement, and check that it is a number that matters.
 
     Raises:
         ValueError: Naming the value and the bound.
     """
-    largest = default if robot.max_cable_mm is None else positive("max_cable_mm", robot.max_cable_mm)
+    largest = default if robot.max_cable_mm is None else check_positive("max_cable_mm", robot.max_cable_mm)
     least = LEAST_CABLE * robot.offset_mm
-    number("max_cable_mm", largest, least, math.inf, f"at least {least:.6g}, {LEAST_CABLE} of offset_mm")
+    check_number("max_cable_mm", largest, least, math.inf, f"at least {least:.6g}, {LEAST_CABLE} of offset_mm")
     object.__setattr__(robot, "max_cable_mm", largest)

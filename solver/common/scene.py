@@ -1,4 +1,4 @@
-"""The obstacles a robot is among."""
+"""The obstacles around a robot."""
 
 import itertools
 from collections.abc import Iterable, Iterator
@@ -15,14 +15,14 @@ MAX_OBSTACLES = 32
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """An ordered set of obstacles; their order is the order of multipliers, gaps and contact flags.
+    """An ordered set of obstacles; their order is that of multipliers, gaps and contact flags.
 
     Attributes:
-        obstacles: The obstacles; any iterable is taken.
+        obstacles: The obstacles; any iterable is accepted.
 
     Raises:
         TypeError: If an entry is not an obstacle.
-        ValueError: If there are more than 32, or some in the plane and some in space.
+        ValueError: If there are more than 32, or some of the plane and some of space.
     """
 
     obstacles: tuple[Obstacle, ...]
@@ -40,7 +40,9 @@ class Scene:
                     "Custom, or in space one of solver.spatial"
                 )
         if len({obstacle.space for obstacle in self.obstacles}) > 1:
-            raise ValueError("obstacles has some of the plane and some of space; a scene holds one kind")
+            raise ValueError(
+                "obstacles has some of the plane and some of space; a scene holds either, solver's or solver.spatial's"
+            )
 
     def __len__(self) -> int:
         return len(self.obstacles)
@@ -55,12 +57,12 @@ class Scene:
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """The shapes, one after the other, then (kxx, kxy, kyy) of every obstacle on a spring [N/mm]; in space six."""
+        """Shapes of all obstacles, then (kxx, kxy, kyy) of every obstacle on a spring [N/mm]; in space six numbers."""
         shapes = [value for obstacle in self.obstacles for value in obstacle.parameters]
         springs = [o.spring_matrix[np.triu_indices(o.space)] for o in self.obstacles if o.spring]
         return (*shapes, *np.ravel(springs).tolist())
 
     @property
     def laws(self) -> tuple[GapLaw, ...]:
-        """The gap laws, in order."""
+        """Gap laws of the obstacles, in order."""
         return tuple(obstacle.law for obstacle in self.obstacles)

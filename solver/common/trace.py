@@ -1,4 +1,4 @@
-"""The shapes accepted on the way of a step."""
+"""Shapes accepted on the way of a step."""
 
 import math
 from typing import NamedTuple
@@ -11,15 +11,15 @@ from solver.common.scene import Scene
 
 
 class Trace(NamedTuple):
-    """The shapes accepted on the way of a step, from the one it started at on.
+    """Shapes accepted on the way of a step, beginning with the one it started from.
 
     Attributes:
         nodes: In the plane backbone point and disk angle of each node, ``(k, n+1, 3)`` [mm, mm, rad], in space the
             point, ``(k, n+1, 3)`` [mm].
         points: The points that can touch, by line and position, ``(k, p, j, d)`` [mm].
-        displacements: How far each obstacle has been pushed from its place, ``(k, m, d)`` [mm].
-        reason: Why the step was given up, empty where it was not: ``"folded"`` where a snap leads to where a segment
-            folds over, ``"work"`` where its budget of work was spent, ``"stuck"`` where the descent found no way on.
+        displacements: How far each obstacle on a spring was pushed, ``(k, m, d)`` [mm].
+        reason: Why the step gave up, empty where it did not: ``"folded"`` where a snap would fold a segment over,
+            ``"work"`` where its budget of work ran out, ``"stuck"`` where the descent made no progress.
     """
 
     nodes: np.ndarray
@@ -29,7 +29,7 @@ class Trace(NamedTuple):
 
 
 def read_trace(traced: tuple[list[float], _kernel.Reason], robot: AnyRobot, scene: Scene, space: int) -> Trace:
-    """The shapes that the kernel has written one after the other."""
+    """Return the shapes that the kernel wrote one after the other, with the reason."""
     parts = ((robot.segments + 1, 3), (len(robot.lines_mm), robot.positions, space), (len(scene), space))
     ends = np.cumsum([math.prod(part) for part in parts])
     numbers, reason = traced

@@ -5,20 +5,22 @@ from functools import lru_cache
 import numpy as np
 
 from solver import _kernel
-from solver.common.batch import BaseBatch
+from solver.common.batch import RobotBatch
 from solver.common.layout import PLANE, Layout
 from solver.common.scene import Scene
 from solver.common.status import Status
-from solver.planar.equilibrium import Equilibrium
-from solver.planar.geometry import touching_points
+from solver.planar.equilibrium import Equilibrium, touching_points
 from solver.planar.layout import layout
 from solver.planar.reference import ReferenceSolver
 from solver.planar.robot import Robot
 from solver.planar.solve import kernel_robot, kernel_scene
 
 
-class BatchSolver(BaseBatch):
-    """Many robots in the plane, each moved as :class:`solver.Solver` would; see :class:`BaseBatch`."""
+class BatchSolver(RobotBatch[Robot, Equilibrium]):
+    """Moves many robots in the plane by one call, with the results of :class:`solver.Solver`.
+
+    See :class:`~solver.common.batch.RobotBatch`.
+    """
 
     model = PLANE
     robot_kind = Robot
@@ -42,9 +44,9 @@ class BatchSolver(BaseBatch):
 
 
 class ReferenceBatch(BatchSolver):
-    """The same robots moved by :class:`solver.ReferenceSolver`, one after the other and slowly.
+    """Moves robots by :class:`solver.ReferenceSolver`, slowly and one after the other.
 
-    Trial pulls of :meth:`ramp_reaches_force` are the kernel's.
+    The trial pulls of :meth:`ramp_reaches_force` still use the kernel.
     """
 
     def _move(self, robots: list[int]) -> None:

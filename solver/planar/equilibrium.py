@@ -1,4 +1,4 @@
-"""The result of a solve: one equilibrium of the robot, immutable and complete."""
+"""Result of a step in the plane."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -7,28 +7,27 @@ import casadi as ca
 import numpy as np
 
 from solver.common.equilibrium import BaseEquilibrium
+from solver.common.geometry import subdivide
 from solver.common.layout import Layout
 from solver.planar.formulation import node_derivatives
-from solver.planar.geometry import touching_points
 from solver.planar.layout import layout
 from solver.planar.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Equilibrium(BaseEquilibrium):
-    """One equilibrium of a robot in a scene; a step starts from it and needs nothing else.
+class Equilibrium(BaseEquilibrium[Robot]):
+    """Equilibrium of a robot among obstacles in the plane; a step starts from it and needs nothing else.
 
     Frame: base at the origin, unactuated backbone along +y, cable on the +x side. The lines of points that can touch
-    are those of ``robot.touch``, by default (backbone, cable). The attributes are those of :class:`BaseEquilibrium`.
+    are those of ``robot.touch``, by default (backbone, cable). The attributes are those of
+    :class:`~solver.common.equilibrium.BaseEquilibrium`.
     """
 
     robot_kind: ClassVar[type] = Robot
 
-    robot: Robot
-
     @property
     def cable_mm(self) -> float:
-        """Cable displacement l, which differs from the command where it stalled or was blocked [mm]."""
+        """Cable displacement l, which falls short of the command where the step stalled or was blocked [mm]."""
         return float(self.block[self._layout.cables.at])
 
     @property
@@ -43,7 +42,7 @@ class Equilibrium(BaseEquilibrium):
 
     @property
     def shear(self) -> np.ndarray:
-        """Shear angle ψ of each segment, ``(n,)`` [rad]; zero with a sliding cable."""
+        """Shear angle ψ of each segment, ``(n,)`` [rad]; zero for a rod."""
         sines = self._layout.coordinates(self.block)
         return np.zeros_like(sines) if self.robot.model == "rod" else np.asarray(np.arcsin(sines))
 
@@ -59,7 +58,7 @@ class Equilibrium(BaseEquilibrium):
 
     @property
     def slack_mm(self) -> float:
-        """How much longer the cable is than its way through the disks [mm]; zero but for a slack, sliding cable."""
+        """Excess length of the cable over its way through the disks [mm]; zero except for a rod with a slack cable."""
         return self.length_mm - self.cable_mm - float(np.hypot(*np.diff(self.cable_nodes, axis=0).T).sum())
 
     @property
@@ -80,9 +79,10 @@ class Equilibrium(BaseEquilibrium):
 
     @property
     def disk_multipliers(self) -> np.ndarray:
-        """Multiplier of where the disks of each segment meet, negative where it bends away from the cable [rad²/mm].
+        """Multiplier of the contact between the disks of each segment [rad²/mm].
 
-        ``(n,)`` with a sliding cable, which alone lets segments bend so far; else ``(0,)``.
+        It is negative where the segment bends away from the cable. The shape is ``(n,)`` for a rod and ``(0,)`` for the
+        paper's model, whose segments shear before they bend so far.
         """
         return self._layout.disk_multipliers(self.block)
 
@@ -109,3 +109,12 @@ class Equilibrium(BaseEquilibrium):
         parameters = [self.cable_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
         unknowns = [self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel(), mounts.ravel()]
         return np.concatenate(unknowns), np.array(parameters)
+
+
+def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:
+    """Return the points of ``robot.touch``, ``(lines, positions, 2)`` [mm], at node poses ``(n+1, 3)``.
+
+    Those between two nodes divide the straight line between their points evenly.
+    """
+    disks = np.column_stack([np.cos(nodes[:, 2]), np.sin(nodes[:, 2])])
+    return subdivide(nodes[:, :2] + np.array(robot.lines_mm)[:, None, None] * disks, robot.between)

@@ -1,33 +1,36 @@
-"""Contact force, read in two ways: by energy, and by the paper's virtual work (section 4, eq. 6–11).
+"""Contact force by energy, and by the paper's virtual-work estimate (section 4, eq. 6–11).
 
-Both are forces on the robot, in newton, in the base frame, one row per obstacle, zero where nothing touches. The
-two are different quantities: the virtual-work estimate knows the tension and the free kinematics only, is free of
-material constants, and is fitted to an experiment through μ; the energy force is that of the model itself.
+Both are forces on the robot, in newtons, in the base frame, one row for each obstacle, zero where nothing touches. They
+are different quantities. The energy force is that of the model itself. The virtual-work estimate uses only the tension
+and the free kinematics, contains no material constant, and is calibrated by an experiment through μ.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from solver.common.operations import NUMBERS, Operations
-from solver.common.validation import LARGEST, array, finite, instance, pair, positive
+from solver.common.operations import NUMBERS, Operations, Value
+from solver.common.validation import LARGEST, check_array, check_finite, check_instance, check_pair, check_positive
 from solver.planar.equilibrium import Equilibrium
 from solver.planar.free import clearance, fitted_slopes, free_tension
 from solver.planar.robot import Robot
 
 
 def force_true(equilibrium: Equilibrium) -> np.ndarray:
-    """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 2)`` [N]."""
-    instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
+    """Return the contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 2)`` [N]."""
+    check_instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
     return equilibrium.forces.copy()
 
 
-def virtual_work(x: Any, y: Any, load: Any, slopes: Any, offset_mm: float, operations: Operations) -> Any:
-    """How many times a force does the virtual work on the tip that a cable load does: c of ``c F·x' = a P_l φ'``.
+def virtual_work(
+    x: Value, y: Value, load: Value, slopes: Iterable[Value], offset_mm: float, operations: Operations
+) -> Value:
+    """Return the factor c for which a force does the virtual work of a cable load: ``c F·x' = a P_l φ'``.
 
-    Zero for a force that does no work against the motion. Of one robot, in numbers, or of many, in arrays ``(N,)``.
+    It is zero for a force that does no work against the motion. Works on floats, for one robot, and on arrays ``(N,)``,
+    for many.
 
     Args:
         x: Force along x [N].
@@ -35,7 +38,7 @@ def virtual_work(x: Any, y: Any, load: Any, slopes: Any, offset_mm: float, opera
         load: Cable load P_l [N].
         slopes: Slopes of the free tip's x, y and angle [mm, mm, rad per mm].
         offset_mm: Distance a of the cable from the backbone [mm].
-        operations: Those of numbers or those of arrays.
+        operations: :data:`~solver.common.operations.NUMBERS` or :data:`~solver.common.operations.ARRAYS`.
     """
     in_x, in_y, turn = slopes
     work = x * in_x + y * in_y
@@ -46,39 +49,38 @@ def virtual_work(x: Any, y: Any, load: Any, slopes: Any, offset_mm: float, opera
 class VirtualWork:
     """The paper's estimator: ``Σ N_j (n_j + μ t_j)·x' = a P_l φ'`` with the slopes x', φ' of the free tip.
 
-    ``n`` is the outward normal, ``t`` the same turned by +90°, ``P_l`` the tension since the onset of the contact. For
-    a wall with normal (−1, 0) this is eq. 11. Several obstacles share one unknown in proportion to their multipliers.
-
-    No constant of the material enters: the estimate is in the unit of the tension.
+    ``n`` is the outward normal, ``t`` the normal turned by +90°, ``P_l`` the tension gained since the onset of contact.
+    For a wall with normal (−1, 0) this is eq. 11. Several obstacles share one unknown, in proportion to their
+    multipliers. No material constant enters: the estimate is in the unit of the tension.
 
     Attributes:
-        friction: Ratio μ of tangential to normal force, found from one experiment (:meth:`calibrated`).
-        fit_range_mm: Range of cable displacement that straight lines are fitted over for the slopes, as in Fig. 7;
-            ``None`` for the exact slopes where the robot is.
+        friction: Ratio μ of tangential to normal force, calibrated by one experiment (:meth:`calibrated`).
+        fit_range_mm: Range of cable displacement over which straight lines are fitted for the slopes, as in Fig. 7;
+            ``None`` for the exact slopes at the present displacement.
 
     Raises:
-        ValueError: If a value is not finite, or the range does not grow from a displacement that is not negative.
+        ValueError: If a value is not finite, or the range is empty or begins below zero.
     """
 
     friction: float = 0.0
     fit_range_mm: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "friction", finite("friction", self.friction))
+        object.__setattr__(self, "friction", check_finite("friction", self.friction))
         if self.fit_range_mm is not None:
-            low, high = pair("fit_range_mm", self.fit_range_mm)
+            low, high = check_pair("fit_range_mm", self.fit_range_mm)
             if not 0 <= low < high:
-                raise ValueError(f"fit_range_mm is {self.fit_range_mm}; it must grow from 0 or more")
+                raise ValueError(f"fit_range_mm is {self.fit_range_mm}; it must grow, from 0 or more")
             object.__setattr__(self, "fit_range_mm", (low, high))
 
     def estimate(self, equilibrium: Equilibrium) -> np.ndarray:
-        """Estimated contact force, ``(m, 2)`` [N].
+        """Return the estimated contact force, ``(m, 2)`` [N].
 
         Raises:
             ValueError: If ``fit_range_mm`` is outside the robot's range.
-            TypeError: If ``equilibrium`` is something else.
+            TypeError: If ``equilibrium`` is not one of the plane.
         """
-        instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
+        check_instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
         slopes = equilibrium.tip_slopes
         if self.fit_range_mm:
             slopes = fitted_slopes(equilibrium.robot.at(equilibrium.length_mm), *self.fit_range_mm)
@@ -89,25 +91,26 @@ class VirtualWork:
 
     @property
     def turn(self) -> np.ndarray:
-        """Matrix that a row of normal forces is multiplied with, to have friction beside it, ``(2, 2)``."""
+        """Matrix that adds friction to a row of normal forces from the right, ``(2, 2)``."""
         return np.array([[1.0, self.friction], [-self.friction, 1.0]])
 
     @classmethod
     def calibrated(cls, force: float, load: float, slopes: np.ndarray, offset_mm: float) -> "VirtualWork":
-        """The estimator whose μ makes eq. 11 give a force measured on a wall across +x at a known cable load.
+        """Return the estimator whose μ makes eq. 11 give the force measured on a wall across +x at a known cable load.
 
         Args:
             force: Measured magnitude of P_x, in the unit of ``load``.
-            load: Cable load P_l since contact.
+            load: Cable load P_l gained since contact.
             slopes: Tip slopes (f'_x, f'_y, φ'), ``(3,)`` [mm/mm, mm/mm, rad/mm].
             offset_mm: Distance of the cable from the backbone [mm].
 
         Raises:
-            ValueError: If a number is not finite, force, load or offset is not positive, or the tip does not move in y,
-                so that friction does no work.
+            ValueError: If a number is not finite, if force, load or offset is not positive, or if the tip does not
+                move in y, so that friction does no work.
         """
-        force, load, offset = positive("force", force), positive("load", load), positive("offset_mm", offset_mm)
-        x, y, turn = array("slopes", slopes, (3,), -LARGEST, LARGEST, "finite").tolist()
+        force, load = check_positive("force", force), check_positive("load", load)
+        offset = check_positive("offset_mm", offset_mm)
+        x, y, turn = check_array("slopes", slopes, (3,), -LARGEST, LARGEST, "finite").tolist()
         if y == 0:
             raise ValueError(
                 f"slopes is {slopes}; the tip must move in y for friction to do work: pull the cable first"
@@ -116,27 +119,31 @@ class VirtualWork:
 
 
 def onset_tension(before: Equilibrium, now: Equilibrium) -> float:
-    """Tension where the present contact began, after a step: kept during a contact, zero while nothing touches [N].
+    """Return the tension at the onset of the present contact, zero while nothing touches [N].
 
-    A contact that begins inside a step does so on the free robot; the tension there is that of the free robot where it
-    first touches.
+    It is kept for the duration of a contact. A contact that begins within the step begins on the free robot, with the
+    tension of the free robot where it first touches.
+
+    Args:
+        before: Equilibrium before the step.
+        now: Equilibrium after the step.
     """
     if not now.multipliers.any():
         return 0.0
     if before.multipliers.any():
         return before.onset_tension
 
-    def on_the_way(part: float) -> tuple[Robot, float]:
+    def free_at(part: float) -> tuple[Robot, float]:
         length = before.length_mm + part * (now.length_mm - before.length_mm)
         return now.robot.at(length), before.cable_mm + part * (now.cable_mm - before.cable_mm)
 
-    def clear_of_all(part: float) -> bool:
-        robot, cable = on_the_way(part)
+    def is_clear(part: float) -> bool:
+        robot, cable = free_at(part)
         return clearance(robot, now.scene, cable) > 0
 
     clear, touching = 0.0, 1.0
-    if not clear_of_all(touching):
+    if not is_clear(touching):
         for _ in range(20):
             middle = (clear + touching) / 2
-            clear, touching = (middle, touching) if clear_of_all(middle) else (clear, middle)
-    return free_tension(*on_the_way(touching))
+            clear, touching = (middle, touching) if is_clear(middle) else (clear, middle)
+    return free_tension(*free_at(touching))

@@ -1,19 +1,19 @@
-"""The mathematics of the planar model, written once, in CasADi.
+"""Mathematics of the planar models (eq. 4 and 5), stated once, in CasADi.
 
-Three layers, all in millimetre and radian:
+Three layers, all in millimetres and radians:
 
 - *segment laws*: the shape of a segment in one reduced coordinate, which eliminates the length equalities of eq. 4:
-  for the uniform cable σ = sin ψ, the sine of the shear angle, for the sliding cable the angle θ between its disks;
-- *gap laws*: signed clearance of a point from an obstacle, scaled so that its gradient has unit length on the
-  surface and a multiplier has units rad²/mm;
-- *node-coordinate problem*: eq. 4/5 of the paper as they stand, for the reference solver and for the certificate.
+  in the paper's model σ = sin ψ, the sine of the shear angle, in the rod the angle θ between its disks;
+- *gap laws*: signed clearance of a point from an obstacle, scaled so that its gradient has unit length on the surface
+  and a multiplier has units rad²/mm;
+- *node-coordinate problem*: eq. 4 and 5 as they stand in the paper, for the reference solver and the certificate.
 
-The first two are turned into C when the package is built (:mod:`solver.codegen`), with their derivatives.
+The build turns the first two into C, with their derivatives (:mod:`solver.codegen`).
 """
 
 import itertools
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -21,24 +21,22 @@ from solver.common.gap_laws import (
     TINY,
     GapLaw,
     Symbol,
-    _square_distance,
     capsule_gap,
     circle_gap,
     gaps_of,
     half_plane_gap,
     sinc_and_cosine,
+    square_distance,
 )
-from solver.common.node_problem import NodeProblem, divided, first_derivatives, norms, second_derivatives
-
-if TYPE_CHECKING:  # the build runs this file alone
-    from solver.planar.robot import Robot
+from solver.common.node_problem import NodeProblem, first_derivatives, grow, norms, second_derivatives, subdivide
+from solver.planar.robot import Robot
 
 
 def segment_half_sine(sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
-    """``u = sin θ/2`` of a segment whose cable is ``pull`` shorter than its backbone; θ is the angle between its disks.
+    """Return ``u = sin θ/2`` of a segment, θ being the angle between its disks, whose cable is shorter by ``pull``.
 
     The chord ``2a·u`` between the free ends of the disks is ``l0 cos ψ − sqrt(la² − l0² sin² ψ)`` with
-    ``la = l0 − pull``; it is written as a quotient so that no digits are lost for a small pull.
+    ``la = l0 − pull``. It is written as a quotient, so that a small pull loses no digits.
     """
     cable = length - pull
     reach = length * ca.sqrt(1 - sine**2) + ca.sqrt(cable**2 - (length * sine) ** 2)
@@ -46,15 +44,15 @@ def segment_half_sine(sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) ->
 
 
 def segment_closure(half_sine: ca.SX, sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
-    """Cable length of a segment squared, minus its value: zero at :func:`segment_half_sine` [mm²]."""
+    """Return the squared cable length of a segment minus its value: zero at :func:`segment_half_sine` [mm²]."""
     chord = 2 * offset * half_sine
     return chord * (chord - 2 * length * ca.sqrt(1 - sine**2)) + pull * (2 * length - pull)
 
 
 def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to an ellipse ``shape = (x, y, a, b, ux, uy)`` with half-axis a along the unit vector u.
+    """Return the gap to an ellipse ``shape = (x, y, a, b, ux, uy)`` with half-axis a along the unit vector u.
 
-    ``F / |∇F|`` of the implicit form ``F = (p·u / a)² + (p·v / b)² − 1``, both halved.
+    It is ``F / |∇F|`` of the implicit form ``F = (p·u / a)² + (p·v / b)² − 1``, both halved.
     """
     local = point - shape[:2]
     along = (local[0] * shape[4] + local[1] * shape[5]) / shape[2]
@@ -64,17 +62,17 @@ def ellipse_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
 
 
 def polygon_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a convex polygon with rounded corners ``shape = (r, x1, y1, …)``, its core's corners counter-clockwise.
+    """Return the gap to a convex polygon ``shape = (r, x1, y1, …)`` with rounded corners, counter-clockwise.
 
-    The distance to the core less the corner radius: that of a half-plane beside an edge, of a point beyond a corner.
-    Corners may be repeated to fill the shape up.
+    It is the distance to the core, that of a half-plane beside an edge and of a point beyond a corner, less the corner
+    radius. Corners may be repeated to fill up the shape.
     """
     corners = ca.reshape(shape[1:], 2, -1)
     count = corners.shape[1]
-    edge, closest = ca.horzcat(corners[:, 0], corners[:, 1]), _square_distance(point, corners[:, 0], corners[:, 1])
+    edge, closest = ca.horzcat(corners[:, 0], corners[:, 1]), square_distance(point, corners[:, 0], corners[:, 1])
     for i in range(1, count):
         start, end = corners[:, i], corners[:, (i + 1) % count]
-        distance = _square_distance(point, start, end)
+        distance = square_distance(point, start, end)
         edge = ca.if_else(distance < closest, ca.horzcat(start, end), edge)
         closest = ca.fmin(distance, closest)
     start, along = edge[:, 0], edge[:, 1] - edge[:, 0]
@@ -96,23 +94,24 @@ GAP_LAWS = (CIRCLE, HALF_PLANE, ELLIPSE, CAPSULE, POLYGON)
 
 
 def segment_function() -> ca.Function:
-    """``(σ, pull, l0, a) → θ, θ_σ, θ_σσ, θ_pull, cos ζ, sin ζ, ζ_σ, ζ_σσ, cos θ, sin θ``.
+    """Return the segment law of the paper's model, with its derivatives in the shear.
 
+    ``(σ, pull, l0, a) → θ, θ_σ, θ_σσ, θ_pull, cos ζ, sin ζ, ζ_σ, ζ_σσ, cos θ, sin θ``, where
     ``ζ = ψ − θ/2`` is the direction of the backbone segment in the frame of its lower disk, from that frame's y axis.
-    The derivatives of θ follow from the closure by the implicit function theorem, which costs one division in all.
+    The derivatives of θ follow from the closure by the implicit function theorem, at the cost of a single division.
     """
     sine, pull, length, offset, u = (ca.SX.sym(name) for name in ("sine", "pull", "length", "offset", "half_sine"))
     closure = segment_closure(u, sine, pull, length, offset)
     in_u, in_sine, in_pull = (ca.gradient(closure, variable) for variable in (u, sine, pull))
     cosine, half_cosine = ca.sqrt(1 - sine**2), ca.sqrt(1 - u**2)
     cosines = cosine * half_cosine
-    per_all = 1 / (in_u * cosines)  # one division serves for three
+    per_all = 1 / (in_u * cosines)  # one division instead of three
     per_closure, per_cosine, per_half_cosine = -per_all * cosines, per_all * in_u * half_cosine, per_all * in_u * cosine
     u_sine = in_sine * per_closure
     u_pull = in_pull * per_closure
-    bent = ca.gradient(in_sine, sine) + 2 * ca.gradient(in_sine, u) * u_sine + ca.gradient(in_u, u) * u_sine**2
+    curved = ca.gradient(in_sine, sine) + 2 * ca.gradient(in_sine, u) * u_sine + ca.gradient(in_u, u) * u_sine**2
     slope = 2 * per_half_cosine * u_sine
-    curvature = 2 * per_half_cosine * (bent * per_closure + u * (per_half_cosine * u_sine) ** 2)
+    curvature = 2 * per_half_cosine * (curved * per_closure + u * (per_half_cosine * u_sine) ** 2)
     law = ca.vertcat(
         2 * ca.asin(u),
         slope,
@@ -130,44 +129,45 @@ def segment_function() -> ca.Function:
 
 
 def arc_function() -> ca.Function:
-    """``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''`` of a segment that is an arc, for a sliding cable.
+    """Return the segment law of the rod, whose segments are arcs, with its derivatives in the angle.
 
+    ``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''``, with
     The chord ``c = l0 sinc θ/2`` along the bisector has the components ``l0·(f, g)`` in the frame of the lower disk,
-    ahead and to its left; ``s = l0 − c + 2a sin θ/2`` is what the segment takes from the cable (Rao 2024).
+    ahead and to its left; ``s = l0 − c + 2a sin θ/2`` is the cable displacement that the segment takes up (Rao 2024).
     """
     angle, length, offset = (ca.SX.sym(name) for name in ("angle", "length", "offset"))
     sinc, cosine = sinc_and_cosine(angle**2 / 4)
     sine = angle / 2 * sinc
-    bent = ca.gradient(sinc, angle)
+    sinc_slope = ca.gradient(sinc, angle)
     shortening = length * (1 - sinc) + 2 * offset * sine
-    taken = ca.gradient(shortening, angle)
+    slope = ca.gradient(shortening, angle)
     law = ca.vertcat(
         angle,
         sinc * cosine,
         -sinc * sine,
-        bent / sinc,
-        ca.gradient(bent, angle) / sinc,
+        sinc_slope / sinc,
+        ca.gradient(sinc_slope, angle) / sinc,
         1 - 2 * sine**2,
         2 * sine * cosine,
         shortening,
-        taken,
-        ca.gradient(taken, angle),
+        slope,
+        ca.gradient(slope, angle),
     )
     return ca.Function("ccr_arc", [angle, length, offset], [ca.cse(law)])
 
 
 def disk_gap(angle: Symbol, length: Symbol, radius: Symbol, thickness: Symbol) -> Symbol:
-    """What is left between two disks, at their edges on the side that a segment bends to by ``angle`` [mm].
+    """Return the gap between the edges of two disks, on the side to which their segment bends by ``angle`` [mm].
 
     The arc at the distance ``radius`` on the inner side has the chord ``2 (l0/θ − R) sin θ/2``, of which the disks take
-    ``t cos θ/2``; without thickness they meet at ``θ = l0/R``.
+    up ``t cos θ/2``; without thickness they meet at ``θ = l0/R``.
     """
     sinc, cosine = sinc_and_cosine(angle**2 / 4)
     return length * sinc - radius * angle * sinc - thickness * cosine
 
 
 def disk_gap_function() -> ca.Function:
-    """``(θ, l0, R, t) → c, c', c''`` of :func:`disk_gap` in the angle."""
+    """Return ``(θ, l0, R, t) → c, c', c''``: :func:`disk_gap` and its derivatives in the angle."""
     angle, *sizes = (ca.SX.sym(name) for name in ("angle", "length", "radius", "thickness"))
     gap = disk_gap(angle, *sizes)
     slope = ca.gradient(gap, angle)
@@ -175,9 +175,9 @@ def disk_gap_function() -> ca.Function:
 
 
 def node_problem(
-    robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...], change: ca.MX | None = None
+    robot: Robot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...], change: ca.MX | None = None
 ) -> NodeProblem:
-    """Build eq. 5 (eq. 4 when there are no obstacles) for a robot's segments and points, and obstacles of given kinds.
+    """Build eq. 5 (eq. 4 when there are no obstacles) for a robot and obstacles of given kinds.
 
     The arccosine of eq. 4 is written as an arctangent of the same disk directions, which is smooth at zero.
 
@@ -185,89 +185,140 @@ def node_problem(
         robot: The robot.
         laws: Gap laws of the obstacles.
         mounted: Which obstacles are on springs.
-        change: Of (l, L0), then of each obstacle its motion (x, y, turn about the origin, growth), ``(2 + 4m,)``
+        change: Change of (l, L0), then of each obstacle its motion (x, y, turn about the origin, growth), ``(2 + 4m,)``
             [mm, rad]; ``None`` for none.
+
+    Returns:
+        The problem. ``unknowns``: backbone then cable points of nodes 1…n, then the displacements of the obstacles on
+        springs, each as x, y pairs, ``(4n + 2s,)`` [mm]. ``parameters``: ``(l, L0, a, EI)``, the shapes of the
+        obstacles, one after the other, and ``(kxx, kxy, kyy)`` of those on springs. ``equalities``: three for each
+        segment, ``(3n,)`` [mm]; see :func:`_paper_segments` and :func:`_rod_segments`. ``inequalities``: those of the
+        robot, see :func:`robot_inequality_count`, then the gaps to obstacles [mm].
     """
-    segments = robot.segments
-    unknowns = ca.MX.sym("unknowns", 4 * segments + 2 * sum(mounted))
+    n = robot.segments
+    unknowns = ca.MX.sym("unknowns", 4 * n + 2 * sum(mounted))
     starts = list(itertools.accumulate((law.size for law in laws), initial=4))
     parameters = ca.MX.sym("parameters", starts[-1] + 3 * sum(mounted))
     pull, total, offset = parameters[0], parameters[1], parameters[2]
     if change is not None:
         pull, total = pull + change[0], total + change[1]
-    energy_scale = parameters[3] * segments / (2 * total)
-    backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(unknowns[: 2 * segments], 2, segments))
-    cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(unknowns[2 * segments : 4 * segments], 2, segments))
-    disk = cable - backbone
-    before, after = disk[:, :-1], disk[:, 1:]
-    turned = before[0, :] * after[1, :] - before[1, :] * after[0, :]
-    angle = ca.atan2(turned, ca.sum1(before * after))
-    chords, cables = norms(backbone[:, 1:] - backbone[:, :-1]), norms(cable[:, 1:] - cable[:, :-1])
-    if robot.model == "rod":
-        sinc, _ = sinc_and_cosine(angle**2 / 4)
-        astride = ca.sum1((backbone[:, 1:] - backbone[:, :-1]) * (before + after)) / (2 * offset)
-        equalities = ca.horzcat(chords - total / segments * sinc, astride, norms(after) - offset)
-        ahead = ca.vertcat(-before[1, :] - after[1, :], before[0, :] + after[0, :])  # across the bisector of the disks
-        ahead = ahead / ca.repmat(norms(ahead), 2, 1)
-        # The way of the cable lies across the bisector; its length has no slope where the holes of two disks meet.
-        way = ca.sum2(ca.sum1((cable[:, 1:] - cable[:, :-1]) * ahead))
-        limited = ca.vertcat(total - pull - way, *_disk_gaps(robot, backbone, disk, ahead))
-    else:
-        share = (total - pull) / segments
-        equalities = ca.horzcat(chords - total / segments, cables - share, norms(after) - offset)
-        limited = ca.MX(0, 1)
-    lines = {"backbone": backbone, "cable": cable, "rim": 2 * backbone - cable}
-    displacements = ca.reshape(unknowns[4 * segments :], 2, -1)
+    pose = _pose(unknowns[: 4 * n], offset)
+    segments = _rod_segments if robot.model == "rod" else _paper_segments
+    equalities, limits = segments(robot, pose, pull, total, offset)
+    displacements = ca.reshape(unknowns[4 * n :], 2, -1)
     springs = ca.reshape(parameters[starts[-1] :], 3, -1)
-    gaps, energy = [], ca.sumsqr(angle)
+    energy_scale = parameters[3] * n / (2 * total)
+    gaps, energy = [], ca.sumsqr(pose.angle)
     for j, law in enumerate(laws):
-        shape, shift, turn = parameters[starts[j] : starts[j + 1]], ca.MX.zeros(2), ca.MX.eye(2)
-        if change is not None:
-            x, y, angle_turned, growth = ca.vertsplit(change[2 + 4 * j : 6 + 4 * j])
-            shift, turn = ca.vertcat(x, y), _rotation(angle_turned)
-            shape = shape + growth * ca.DM([k in law.growth for k in range(law.size)])
+        own = None if change is None else change[2 + 4 * j : 6 + 4 * j]
+        shape, shift, turn = _moved(law, parameters[starts[j] : starts[j + 1]], own)
         if mounted[j]:
             mount = sum(mounted[:j])
-            moved, (xx, xy, yy) = displacements[:, mount], ca.vertsplit(springs[:, mount])
-            energy += (xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2) / (2 * energy_scale)
+            moved = displacements[:, mount]
+            energy += _twice_spring_energy(springs[:, mount], moved) / (2 * energy_scale)
             shift = shift + moved
         for line in robot.touch:
-            points = divided(lines[line], robot.between)[:, 1:]
+            points = subdivide(pose.line(line), robot.between)[:, 1:]
             gaps.append(gaps_of(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
-    return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(limited, *gaps))
+    return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(limits, *gaps))
 
 
-def limits(robot: "Robot") -> int:
-    """How many inequalities a robot's node problem has before the gaps to obstacles."""
+def robot_inequality_count(robot: Robot) -> int:
+    """Return how many inequalities of the node problem come before the gaps to obstacles.
+
+    These are the slack of the rod's cable, then the gap between the disks of each segment on the cable's side, then on
+    the other; the paper's model has none.
+    """
     return 1 + 2 * robot.segments if robot.model == "rod" else 0
 
 
-def _disk_gaps(robot: "Robot", backbone: ca.MX, disk: ca.MX, ahead: ca.MX) -> list[ca.MX]:
-    """What is left between consecutive disks at their edges, across their bisector, on each side [mm]."""
+class _Pose(NamedTuple):
+    """Points of backbone and cable at nodes 0…n, the disks between them, and the angles of the segments."""
+
+    backbone: ca.MX
+    cable: ca.MX
+    disk: ca.MX
+    angle: ca.MX
+
+    def line(self, name: str) -> ca.MX:
+        """Return the points of a line that ``Robot.touch`` names."""
+        return {"backbone": self.backbone, "cable": self.cable, "rim": 2 * self.backbone - self.cable}[name]
+
+
+def _pose(points: ca.MX, offset: ca.MX) -> _Pose:
+    n = points.shape[0] // 4
+    backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(points[: 2 * n], 2, n))
+    cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(points[2 * n :], 2, n))
+    disk = cable - backbone
+    before, after = disk[:, :-1], disk[:, 1:]
+    sine = before[0, :] * after[1, :] - before[1, :] * after[0, :]
+    return _Pose(backbone, cable, disk, ca.atan2(sine, ca.sum1(before * after)))
+
+
+def _paper_segments(robot: Robot, pose: _Pose, pull: ca.MX, total: ca.MX, offset: ca.MX) -> tuple[ca.MX, ca.MX]:
+    """Return the equalities of the paper's segments: lengths of backbone, cable and disk minus their values."""
+    chords = norms(pose.backbone[:, 1:] - pose.backbone[:, :-1])
+    cables = norms(pose.cable[:, 1:] - pose.cable[:, :-1])
+    share = (total - pull) / robot.segments
+    lengths = chords - total / robot.segments, cables - share, norms(pose.disk[:, 1:]) - offset
+    return ca.horzcat(*lengths), ca.MX(0, 1)
+
+
+def _rod_segments(robot: Robot, pose: _Pose, pull: ca.MX, total: ca.MX, offset: ca.MX) -> tuple[ca.MX, ca.MX]:
+    """Return the equalities of the rod's segments, which are arcs, and the robot's own inequalities.
+
+    Equalities: length of the chord minus its value, component of the chord along the bisector of the disks, length of
+    the disk minus its value. Inequalities: slack of the cable, then the gaps between disks.
+    """
+    before, after = pose.disk[:, :-1], pose.disk[:, 1:]
+    chord = pose.backbone[:, 1:] - pose.backbone[:, :-1]
+    sinc, _ = sinc_and_cosine(pose.angle**2 / 4)
+    astride = ca.sum1(chord * (before + after)) / (2 * offset)
+    equalities = ca.horzcat(norms(chord) - total / robot.segments * sinc, astride, norms(after) - offset)
+    ahead = ca.vertcat(-before[1, :] - after[1, :], before[0, :] + after[0, :])  # across the bisector of the disks
+    ahead = ahead / ca.repmat(norms(ahead), 2, 1)
+    # The cable runs across the bisector; its length has no slope where the holes of two disks meet.
+    way = ca.sum2(ca.sum1((pose.cable[:, 1:] - pose.cable[:, :-1]) * ahead))
+    return equalities, ca.vertcat(total - pull - way, *_disk_gaps(robot, pose, ahead))
+
+
+def _disk_gaps(robot: Robot, pose: _Pose, ahead: ca.MX) -> list[ca.MX]:
+    """Return the gaps between the edges of consecutive disks, across their bisector, on each side [mm]."""
     radius, thickness = robot.disk_radius_mm, robot.disk_thickness_mm
     assert radius is not None
-    half_cosine = norms(disk[:, :-1] + disk[:, 1:]) / (2 * robot.offset_mm)
+    half_cosine = norms(pose.disk[:, :-1] + pose.disk[:, 1:]) / (2 * robot.offset_mm)
     gaps = []
     for side in (1, -1):
-        edges = backbone + side * radius / robot.offset_mm * disk
+        edges = pose.backbone + side * radius / robot.offset_mm * pose.disk
         apart = ca.sum1((edges[:, 1:] - edges[:, :-1]) * ahead)
         gaps.append((apart - thickness * half_cosine).T)
     return gaps
 
 
-def _rotation(angle: ca.MX) -> ca.MX:
-    cosine, sine = ca.cos(angle), ca.sin(angle)
-    return ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
+def _moved(law: GapLaw, shape: ca.MX, change: ca.MX | None) -> tuple[ca.MX, ca.MX, ca.MX]:
+    """Return the shape, shift and rotation of an obstacle after a change of its own."""
+    if change is None:
+        return shape, ca.MX.zeros(2), ca.MX.eye(2)
+    x, y, turn, growth = ca.vertsplit(change)
+    cosine, sine = ca.cos(turn), ca.sin(turn)
+    rotation = ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
+    return grow(law, shape, growth), ca.vertcat(x, y), rotation
+
+
+def _twice_spring_energy(spring: ca.MX, moved: ca.MX) -> ca.MX:
+    """Return twice the energy of a spring ``(kxx, kxy, kyy)`` [N·mm]."""
+    xx, xy, yy = ca.vertsplit(spring)
+    return xx * moved[0] ** 2 + 2 * xy * moved[0] * moved[1] + yy * moved[1] ** 2
 
 
 @lru_cache(maxsize=32)
-def node_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
-    """:func:`first_derivatives` of :func:`node_problem`."""
+def node_derivatives(robot: Robot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
+    """Return the :func:`~solver.common.node_problem.first_derivatives` of :func:`node_problem`."""
     return first_derivatives(node_problem(robot, laws, mounted))
 
 
 @lru_cache(maxsize=32)
-def kkt_derivatives(robot: "Robot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
-    """:func:`second_derivatives` of :func:`node_problem`."""
+def kkt_derivatives(robot: Robot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
+    """Return the :func:`~solver.common.node_problem.second_derivatives` of :func:`node_problem`."""
     change = ca.MX.sym("change", 2 + 4 * len(laws))
     return second_derivatives(node_problem(robot, laws, mounted, change), change)

@@ -1,4 +1,4 @@
-"""The robot that nothing touches, in closed form: all segments have the same shape."""
+"""The free robot, which nothing touches, in closed form: all segments have the same shape."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -10,17 +10,17 @@ from solver.common.checks import check_scene
 from solver.common.geometry import touching_gaps
 from solver.common.layout import PLANE
 from solver.common.scene import Scene
-from solver.common.validation import instance, number, whole
+from solver.common.validation import check_instance, check_number, check_whole
+from solver.planar.equilibrium import touching_points
 from solver.planar.formulation import arc_function
-from solver.planar.geometry import touching_points
 from solver.planar.robot import Robot
 
 NEWTON_ITERATIONS = 8
-RESOLVED = 1e-9  # of the cable limit: a line over less is fitted to roundoff
+RESOLVED = 1e-9  # of the cable limit: a line fitted over less would fit roundoff
 
 
 class _Segment(NamedTuple):
-    """A segment of the free robot: angle of its disks [rad], chord [mm], and their slopes in the cable displacement."""
+    """A segment of the free robot: angle of its disks [rad], chord [mm], and their slopes in the displacement."""
 
     angle: float
     chord: float
@@ -29,16 +29,22 @@ class _Segment(NamedTuple):
 
 
 def tip_slopes(robot: Robot, cable_mm: float, node: int | None = None) -> np.ndarray:
-    """Exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [mm, mm, rad per mm].
+    """Return the exact slopes of the free tip pose (x, y, φ) in the cable displacement (eq. 7), ``(3,)`` [1/mm].
 
-    With ``node``, those of the node of that index, as if the robot ended there.
+    Args:
+        robot: The robot.
+        cable_mm: Cable displacement [mm].
+        node: Index of the node whose pose is meant; ``None`` for the tip.
+
+    Returns:
+        Slopes [mm, mm, rad per mm].
 
     Raises:
-        ValueError: If the displacement or the node is none of the robot's.
-        TypeError: If the robot is something else.
+        ValueError: If the displacement or the node is out of the robot's range.
+        TypeError: If the robot is not one of the plane.
     """
     angle, chord, turn, stretch = _segment(robot, cable_mm)
-    node = robot.segments if node is None else _node(robot, node)
+    node = robot.segments if node is None else _check_node(robot, node)
     middles = np.arange(node) + 0.5
     sines, cosines, turns = np.sin(middles * angle), np.cos(middles * angle), middles * turn
     return np.array(
@@ -51,16 +57,23 @@ def tip_slopes(robot: Robot, cable_mm: float, node: int | None = None) -> np.nda
 
 
 def fitted_slopes(robot: Robot, low_mm: float, high_mm: float, node: int | None = None) -> np.ndarray:
-    """Slopes of straight lines fitted to the free tip pose over a range of cable displacement (Fig. 7), as above.
+    """Return the slopes of straight lines fitted to the free tip pose over a range of displacement (Fig. 7).
 
-    With ``node``, those of the node of that index.
+    Args:
+        robot: The robot.
+        low_mm: Least cable displacement [mm].
+        high_mm: Largest cable displacement [mm].
+        node: Index of the node whose pose is meant; ``None`` for the tip.
+
+    Returns:
+        Slopes of x, y and φ, ``(3,)`` [mm, mm, rad per mm].
 
     Raises:
-        ValueError: If the range is too small to fit a line to or outside the robot's, or the node is none of it.
-        TypeError: If the robot is something else.
+        ValueError: If the range is too small to fit a line to, or it or the node is out of the robot's range.
+        TypeError: If the robot is not one of the plane.
     """
-    node = _node(robot, robot.segments if node is None else node)
-    low, high = _cable(robot, low_mm), _cable(robot, high_mm)
+    node = robot.segments if node is None else _check_node(robot, node)
+    low, high = _check_cable(robot, low_mm), _check_cable(robot, high_mm)
     least = RESOLVED * robot.cable_limit_mm
     if not high - low >= least:
         bounds = f"0 to {robot.cable_limit_mm:.6g} mm, by at least {least:.2g} mm"
@@ -71,12 +84,12 @@ def fitted_slopes(robot: Robot, low_mm: float, high_mm: float, node: int | None 
 
 
 def free_angle(robot: Robot, cable_mm: float) -> float:
-    """Angle between consecutive disks [rad]."""
+    """Return the angle between consecutive disks of the free robot [rad]."""
     return _segment(robot, cable_mm).angle
 
 
 def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
-    """Node poses, ``(n+1, 3)`` [mm, mm, rad]."""
+    """Return the node poses of the free robot, ``(n+1, 3)`` [mm, mm, rad]."""
     angle, chord, *_ = _segment(robot, cable_mm)
     nodes = np.zeros((robot.segments + 1, 3))
     middles = (np.arange(robot.segments) + 0.5) * angle
@@ -87,44 +100,45 @@ def free_nodes(robot: Robot, cable_mm: float) -> np.ndarray:
 
 
 def free_tension(robot: Robot, cable_mm: float) -> float:
-    """Cable tension, ``B dJ/dl`` [N]."""
+    """Return the cable tension of the free robot, ``B dJ/dl`` [N]."""
     segment = _segment(robot, cable_mm)
     return 2 * robot.energy_scale * robot.segments * segment.angle * segment.turn
 
 
 def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
-    """Smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact.
+    """Return the smallest gap of the free robot at a cable displacement [mm]; negative where it would be in contact.
 
     Raises:
-        ValueError: If the displacement is none of the robot's, or the scene is out of all proportion to it.
-        TypeError: If the robot or the scene is something else.
+        ValueError: If the displacement is out of the robot's range, or the scene is out of proportion to it.
+        TypeError: If the robot or the scene is of the wrong class.
     """
     check_scene(robot, Robot, scene, PLANE)
     points = touching_points(robot, free_nodes(robot, cable_mm))
     return float(touching_gaps(robot, scene, points).min(initial=np.inf))
 
 
-def _cable(robot: Robot, cable_mm: float) -> float:
-    """A cable displacement that the robot has."""
-    instance("robot", robot, Robot, "the free robot in closed form is one of the plane")
+def _check_cable(robot: Robot, cable_mm: float) -> float:
+    """Return a cable displacement within the robot's range as a float."""
+    check_instance("robot", robot, Robot, "the closed form is that of robots of the plane")
     limit = robot.cable_limit_mm
-    return number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+    return check_number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
 
 
-def _node(robot: Robot, node: int) -> int:
-    return whole("node", node, 0, robot.segments)
+def _check_node(robot: Robot, node: int) -> int:
+    return check_whole("node", node, 0, robot.segments)
 
 
 def _segment(robot: Robot, cable_mm: float) -> _Segment:
-    cable_mm = _cable(robot, cable_mm)
+    """Return the segment that all of the free robot's are, in the rod by Newton's method on the cable length."""
+    cable_mm = _check_cable(robot, cable_mm)
     pull, length, offset = cable_mm / robot.segments, robot.segment_mm, robot.offset_mm
     if robot.model == "paper":  # its shear vanishes
         turn = 1 / np.sqrt((robot.segments * offset) ** 2 - cable_mm**2 / 4)
         return _Segment(float(2 * np.arcsin(pull / (2 * offset))), length, float(turn), 0.0)
     angle = pull / offset
     for _ in range(NEWTON_ITERATIONS):
-        *_, taken, slope, _ = _arc(angle, length, offset)
-        angle -= (taken - pull) / slope
+        *_, shortening, slope, _ = _arc(angle, length, offset)
+        angle -= (shortening - pull) / slope
     _, _, _, stretch, *_, slope, _ = _arc(angle, length, offset)
     chord, turn = length * np.sinc(angle / (2 * np.pi)), 1 / (robot.segments * slope)
     return _Segment(float(angle), float(chord), float(turn), float(stretch * chord * turn))

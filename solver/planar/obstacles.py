@@ -1,4 +1,4 @@
-"""Obstacles of the plane, and what those of space share with them, validated once."""
+"""Obstacles of the plane, validated on construction."""
 
 import itertools
 import math
@@ -14,10 +14,10 @@ from solver.common.validation import (
     SMALLEST,
     Pair,
     Point,
-    pair,
-    positive,
-    sequence,
-    unit,
+    check_pair,
+    check_planar_direction,
+    check_positive,
+    check_sequence,
 )
 from solver.planar.formulation import CAPSULE, CIRCLE, ELLIPSE, HALF_PLANE, POLYGON, POLYGON_CORNERS
 
@@ -41,25 +41,25 @@ class Circle(Obstacle):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(x, y, r)."""
+        """Parameters (x, y, r) of the gap law."""
         return (*self.center, self.radius)
 
     @property
     def extent(self) -> Extent:
-        """The disc itself."""
+        """Size of the disc."""
         return Extent(self.center, self.radius, self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
-        """Points of the circle, ``(k, 2)`` [mm]."""
+        """Return points of the circle, ``(k, 2)`` [mm]."""
         return np.array(self.center) + self.radius * directions()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HalfPlane(Obstacle):
-    """A flat wall, or with ``nodes`` the paper's load cell (eq. 12), which only the named nodes meet.
+    """A flat wall, or with ``nodes`` the paper's load cell (eq. 12), which only the named nodes touch.
 
     Attributes:
-        point: A point (x, y) of its surface [mm].
+        point: A point (x, y) of the surface [mm].
         normal: Outward normal, from the wall towards the robot; normalised on construction.
 
     Raises:
@@ -67,24 +67,25 @@ class HalfPlane(Obstacle):
     """
 
     law: ClassVar[GapLaw] = HALF_PLANE
-    places: ClassVar[tuple[str, ...]] = ("point",)
-    lengths: ClassVar[tuple[str, ...]] = ()
+    point_fields: ClassVar[tuple[str, ...]] = ("point",)
+    size_fields: ClassVar[tuple[str, ...]] = ()
 
     point: Pair
     normal: Pair
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "normal", unit("normal", self.normal, "from the wall towards the robot"))
+        normal = check_planar_direction("normal", self.normal, "from the wall towards the robot")
+        object.__setattr__(self, "normal", normal)
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(nx, ny, offset)."""
+        """Parameters (nx, ny, offset) of the gap law."""
         return (*self.normal, self.normal[0] * self.point[0] + self.normal[1] * self.point[1])
 
     @property
     def extent(self) -> Extent:
-        """Without bounds, and flat."""
+        """Size of the half-plane, which is unbounded and flat."""
         return Extent(self.point, math.inf, math.inf, math.inf)
 
     @property
@@ -99,7 +100,7 @@ class HalfPlane(Obstacle):
         return np.asarray(point - ((point - self.point) @ inward) * inward)
 
     def outline(self) -> np.ndarray:
-        """The point of the surface, ``(1, 2)`` [mm]."""
+        """Return the given point of the surface, ``(1, 2)`` [mm]."""
         return np.array([self.point])
 
 
@@ -117,7 +118,7 @@ class Ellipse(Obstacle):
     """
 
     law: ClassVar[GapLaw] = ELLIPSE
-    lengths: ClassVar[tuple[str, ...]] = ()
+    size_fields: ClassVar[tuple[str, ...]] = ()
 
     center: Pair
     radii: Pair
@@ -125,26 +126,26 @@ class Ellipse(Obstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        first, second = pair("radii", self.radii)
+        first, second = check_pair("radii", self.radii)
         for radius in (first, second):
-            positive("a half-axis of radii", radius)
+            check_positive("a half-axis of radii", radius)
         object.__setattr__(self, "radii", (first, second))
-        object.__setattr__(self, "axis", unit("axis", self.axis, "of the first half-axis"))
+        object.__setattr__(self, "axis", check_planar_direction("axis", self.axis, "of the first half-axis"))
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(x, y, a, b, ux, uy)."""
+        """Parameters (x, y, a, b, ux, uy) of the gap law."""
         return (*self.center, *self.radii, *self.axis)
 
     @property
     def extent(self) -> Extent:
-        """The disc of the larger half-axis, and the curvature at its end."""
+        """Disc of the larger half-axis, and the curvature at its end."""
         small, large = sorted(self.radii)
         return Extent(self.center, large, small, small**2 / large)
 
     @property
     def surface(self) -> np.ndarray:
-        """Points of its surface, ``(k, 2)`` [mm]."""
+        """Points of the surface, ``(k, 2)`` [mm]."""
         return self.outline()
 
     def _radii(self) -> list[tuple[str, float]]:
@@ -152,17 +153,17 @@ class Ellipse(Obstacle):
         return [("a half-axis", small), ("a half-axis", large), ("the sharpest radius", small * (small / large))]
 
     def outline(self) -> np.ndarray:
-        """Points of the ellipse, ``(k, 2)`` [mm]."""
+        """Return points of the ellipse, ``(k, 2)`` [mm]."""
         x, y = self.axis
         return np.asarray(self.center + directions() * self.radii @ np.array([[x, y], [-y, x]]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capsule(Obstacle):
-    """All points within a radius of a line: a rod, a rounded bar.
+    """All points within a radius of a line segment: a round-ended bar.
 
     Attributes:
-        start: One end (x, y) of the line [mm].
+        start: One end (x, y) of the line segment [mm].
         end: Its other end [mm].
         radius: The radius [mm].
 
@@ -171,7 +172,7 @@ class Capsule(Obstacle):
     """
 
     law: ClassVar[GapLaw] = CAPSULE
-    places: ClassVar[tuple[str, ...]] = ("start", "end")
+    point_fields: ClassVar[tuple[str, ...]] = ("start", "end")
 
     start: Pair
     end: Pair
@@ -184,17 +185,17 @@ class Capsule(Obstacle):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(x1, y1, x2, y2, r)."""
+        """Parameters (x1, y1, x2, y2, r) of the gap law."""
         return (*self.start, *self.end, self.radius)
 
     @property
     def extent(self) -> Extent:
-        """The disc about the middle of the line."""
+        """Disc about the middle of the line segment."""
         middle = ((self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2)
         return Extent(middle, math.dist(self.start, self.end) / 2 + self.radius, self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
-        """Points of its surface, ``(k, 2)`` [mm]."""
+        """Return points of the surface, ``(k, 2)`` [mm]."""
         return _rounded(np.array([self.start, self.end]), self.radius)
 
 
@@ -207,20 +208,20 @@ class Polygon(Obstacle):
         radius: Radius of the corners, which also lies around the edges [mm].
 
     Raises:
-        ValueError: If a value is not finite, the radius not positive, or the corners are too few, too many or not
+        ValueError: If a value is not finite, the radius is not positive, or the corners are too few, too many or not
             those of a convex polygon.
     """
 
     law: ClassVar[GapLaw] = POLYGON
-    places: ClassVar[tuple[str, ...]] = ()
+    point_fields: ClassVar[tuple[str, ...]] = ()
 
     corners: tuple[Pair, ...]
     radius: float
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        given = sequence("corners", self.corners, "a tuple of pairs (x, y)")
-        corners = tuple(pair("a corner", corner) for corner in given[: POLYGON_CORNERS + 1])
+        given = check_sequence("corners", self.corners, "a tuple of pairs (x, y)")
+        corners = tuple(check_pair("a corner", corner) for corner in given[: POLYGON_CORNERS + 1])
         if not 3 <= len(corners) <= POLYGON_CORNERS:
             raise ValueError(f"corners has {len(given)} points; it must have 3 to {POLYGON_CORNERS}")
         turns = _turns(corners)
@@ -233,59 +234,59 @@ class Polygon(Obstacle):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(r, x1, y1, …), the last corner repeated to fill up."""
+        """Parameters (r, x1, y1, …) of the gap law, the last corner repeated to fill up."""
         filled = self.corners + (POLYGON_CORNERS - len(self.corners)) * self.corners[-1:]
         return (self.radius, *(value for corner in filled for value in corner))
 
     @property
     def extent(self) -> Extent:
-        """The disc about the mean of the corners."""
+        """Disc about the mean of the corners."""
         x, y = np.mean(self.corners, axis=0).tolist()
         farthest = max(math.dist((x, y), corner) for corner in self.corners)
         return Extent((x, y), farthest + self.radius, _inradius(np.array(self.corners)) + self.radius, self.radius)
 
     def shifted(self, by: Iterable[float]) -> Self:
-        """The polygon elsewhere."""
-        shift = pair("by", by)
+        """Return the polygon moved by a shift [mm]."""
+        shift = check_pair("by", by)
         return replace(self, corners=tuple((x + shift[0], y + shift[1]) for x, y in self.corners))
 
     def _points(self) -> list[tuple[str, Point]]:
         return [("a corner", corner) for corner in self.corners]
 
     def outline(self) -> np.ndarray:
-        """Points of its surface, ``(k, 2)`` [mm]."""
+        """Return points of the surface, ``(k, 2)`` [mm]."""
         return _rounded(np.array(self.corners), self.radius)
 
 
 def _turns(corners: tuple[Pair, ...]) -> list[float]:
-    """Angle turned at each corner, counter-clockwise positive [rad]."""
+    """Return the angle turned at each corner, counter-clockwise positive [rad]."""
     edges = np.roll(corners, -1, axis=0) - np.asarray(corners)
     headings = np.arctan2(edges[:, 1], edges[:, 0])
     return list(np.remainder(headings - np.roll(headings, 1) + np.pi, 2 * np.pi) - np.pi)
 
 
 def _inradius(corners: np.ndarray) -> float:
-    """Radius of the largest disc in a convex polygon, corners counter-clockwise; it touches three of the edges [mm]."""
+    """Return the radius of the largest disc in a convex, counter-clockwise polygon; it touches three edges [mm]."""
     edges = np.roll(corners, -1, axis=0) - corners
     inward = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
     offsets = (inward * corners).sum(axis=1)
     largest = 0.0
     for three in map(list, itertools.combinations(range(len(corners)), 3)):
-        sides = np.column_stack([inward[three], -np.ones(3)])  # distance of the centre from each, less the radius
-        if abs(np.linalg.det(sides)) > 1e-12:
-            x, y, radius = np.linalg.solve(sides, offsets[three])
+        edges = np.column_stack([inward[three], -np.ones(3)])  # distance of the centre from each, less the radius
+        if abs(np.linalg.det(edges)) > 1e-12:
+            x, y, radius = np.linalg.solve(edges, offsets[three])
             if (inward @ (x, y) - offsets).min() >= radius * (1 - 1e-9):
                 largest = max(largest, float(radius))
     return largest
 
 
 def directions() -> np.ndarray:
-    """Unit vectors once round, ``(96, 2)``."""
+    """Return evenly spaced unit vectors, ``(96, 2)``."""
     angles = np.linspace(0, 2 * np.pi, 97)[:-1]
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 def _rounded(core: np.ndarray, radius: float) -> np.ndarray:
-    """Outline of everything within a radius of the polygon or line through some points, ``(k, 2)``."""
+    """Return the outline of all points within a radius of a convex core, given by its corners, ``(k, 2)``."""
     around = directions()
     return np.asarray(core[(around @ core.T).argmax(axis=1)] + radius * around)

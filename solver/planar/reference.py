@@ -1,10 +1,10 @@
-"""The reference solver: eq. 4/5 in the node coordinates of the paper, through CasADi and IPOPT.
+"""Reference solver: eq. 4 and 5 in the node coordinates of the paper, solved by IPOPT through CasADi.
 
-It shares with :class:`solver.Solver` neither coordinates nor algorithm, only the statement of the problem, and is about
+It shares the statement of the problem with :class:`solver.Solver`, but neither coordinates nor algorithm, and is about
 a thousand times slower. Tests compare the two.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from solver.common.checks import check_clear, check_core, check_scene
 from solver.common.geometry import touchable_points
 from solver.common.ipopt import (
+    ANGLE_UNIT,
     INSERTION,
     LARGEST_STEP,
     MOVE_OFFSET,
@@ -21,16 +22,15 @@ from solver.common.ipopt import (
     RESOLUTION,
     SLACK,
     SMALLEST_STEP,
-    TURN,
+    nlp_solver,
 )
 from solver.common.layout import PLANE
 from solver.common.scene import Scene
 from solver.common.status import Status
-from solver.planar.equilibrium import Equilibrium
+from solver.planar.equilibrium import Equilibrium, touching_points
 from solver.planar.forces import onset_tension
-from solver.planar.formulation import limits, node_derivatives, node_problem
+from solver.planar.formulation import node_derivatives, node_problem, robot_inequality_count
 from solver.planar.free import free_angle, free_tension, tip_slopes
-from solver.planar.geometry import touching_points
 from solver.planar.layout import layout
 from solver.planar.robot import Robot
 from solver.planar.solve import check_command
@@ -47,7 +47,7 @@ class _Point(NamedTuple):
 
 
 class _Pose(NamedTuple):
-    """A shape: points of nodes 0…n, angles of their disks, turns of the segments, and their reduced coordinates."""
+    """A shape: points of nodes 0…n, angles of their disks, turns of the segments and their reduced coordinates."""
 
     backbone: np.ndarray
     cable: np.ndarray
@@ -57,9 +57,9 @@ class _Pose(NamedTuple):
 
 
 class ReferenceSolver:
-    """Follows the same equilibria as :class:`solver.Solver`, by the problem as the paper writes it.
+    """Follows the same equilibria as :class:`solver.Solver`, by solving the problem as the paper states it.
 
-    Only a branch is followed: where it ends, a step is ``GAVE_UP``.
+    It only follows a branch: where the branch ends, a step is ``GAVE_UP``.
 
     Args:
         robot: The robot.
@@ -78,36 +78,35 @@ class ReferenceSolver:
         self.scene = scene
         self._touchable = touchable_points(robot, scene)
         check_core(robot, scene)
-        self._sliding = robot.model == "rod"
-        self._limits = limits(robot)
+        self._is_rod = robot.model == "rod"
+        self._robot_inequalities = robot_inequality_count(robot)
         self._build()
         self._rest = self._equilibrium(self._free(0.0, robot.length_mm), Status.CONVERGED, 0)
         check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> Equilibrium:
-        """The straight, unactuated robot."""
+        """Return the straight, unactuated robot."""
         return self._rest
 
     def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
         """Move cable and base along the branch, as far as the tension allows.
 
         Args:
-            equilibrium: Where the robot is, from this solver or a :class:`solver.Solver` of an equal robot and scene.
+            equilibrium: State to start from, of this solver or a :class:`solver.Solver` of an equal robot and scene.
             cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
             length_mm: Commanded length of the backbone [mm]; ``None`` keeps it.
 
         Returns:
-            The equilibrium reached: ``CONVERGED``, ``STALLED`` at the tension limit, or
-            ``GAVE_UP`` with the present one.
+            The equilibrium reached: ``CONVERGED``, ``STALLED`` at the tension limit, or ``GAVE_UP`` with the one given.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
         cable_mm, length = self.check_command(equilibrium, cable_mm, length_mm)
         present, iterations, largest = self._start(equilibrium), 0, LARGEST_STEP
-        while (distance := self._apart(present, cable := self._goal(present, cable_mm), length)) > 0:
+        while (distance := self._distance(present, cable := self._goal(present, cable_mm), length)) > 0:
             part = min(1.0, largest / distance)
-            following = self._between(present, cable, length, part)
+            following = self._solve_part(present, cable, length, part)
             if following is None:
                 if largest > SMALLEST_STEP:
                     largest /= 2
@@ -119,32 +118,28 @@ class ReferenceSolver:
             present = following
         return self._equilibrium(present, Status.CONVERGED, iterations, equilibrium)
 
-    def _between(self, present: _Point, cable: float, length: float, part: float) -> _Point | None:
-        """The solution a part of the way to a command."""
+    def _solve_part(self, present: _Point, cable: float, length: float, part: float) -> _Point | None:
+        """Return the solution part of the way to a command, ``None`` where IPOPT finds none."""
         if part == 1:
             return self._solve(present, cable, length)
         towards = (present.cable + part * (cable - present.cable), present.length + part * (length - present.length))
         return self._solve(present, *towards)
 
     def _build(self) -> None:
+        """Create the IPOPT solver, the slope of the Lagrangian in the cable displacement, and the bounds."""
         n = self.robot.segments
         problem = node_problem(self.robot, self.scene.laws, self.scene.mounted)
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
-        # In units of the free robot's segment angle, so that the tolerances mean the same at every displacement;
-        # with a sliding cable a robot bends without any, too.
-        unit = TURN if self._sliding else problem.parameters[0] / (n * problem.parameters[2])
-        nlp: dict[str, Any] = {
-            "x": problem.unknowns,
-            "p": problem.parameters,
-            "f": problem.objective / unit**2,
-            "g": constraints,
-        }
-        self._nlp_solver = ca.nlpsol("reference", self._plugin, nlp, self._options)
+        # Angles are in units of the free robot's segment angle, so that the tolerances mean the same at every
+        # displacement; not so for a rod, which obstacles also bend without any displacement.
+        unit = ANGLE_UNIT if self._is_rod else problem.parameters[0] / (n * problem.parameters[2])
+        nlp = {"x": problem.unknowns, "p": problem.parameters, "f": problem.objective / unit**2, "g": constraints}
+        self._nlp_solver = nlp_solver(nlp, self._options, self._plugin)
         multipliers = ca.MX.sym("multipliers", constraints.shape[0])
         lagrangian = problem.objective + ca.dot(multipliers, constraints)
         slope = ca.gradient(lagrangian, problem.parameters)[0]
         self._cable_slope = ca.Function("cable_slope", [problem.unknowns, problem.parameters, multipliers], [slope])
-        bounded = np.concatenate([np.ones(self._limits, bool), self._touchable[:, :, 1:].ravel()])
+        bounded = np.concatenate([np.ones(self._robot_inequalities, bool), self._touchable[:, :, 1:].ravel()])
         self._lower = np.concatenate([np.zeros(3 * n), np.where(bounded, 0.0, -np.inf)])
         self._upper = np.concatenate([np.zeros(3 * n), np.full(bounded.size, np.inf)])
 
@@ -152,17 +147,18 @@ class ReferenceSolver:
         return [cable, length, self.robot.offset_mm, self.robot.rigidity, *self.scene.parameters]
 
     def _scale(self, cable: float) -> float:
-        return TURN**2 if self._sliding else (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
+        return ANGLE_UNIT**2 if self._is_rod else (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
 
     def _goal(self, point: _Point, cable: float) -> float:
-        touching = not self._sliding and bool(self._pushes(point).any())
+        """Return a command, in the paper's model at least the pretension while anything touches."""
+        touching = not self._is_rod and bool(self._pushing(point).any())
         pretension = PRETENSION * self.robot.offset_mm
         return max(cable, min(point.cable, pretension)) if touching else cable
 
     def _shape(self, cable: float, length: float, coordinates: np.ndarray) -> np.ndarray:
-        """Unknowns of the robot with given reduced coordinates: angles of its arcs, or sines of its shear angles."""
+        """Return the unknowns of a robot with given reduced coordinates: angles of arcs, or sines of shear angles."""
         n, a, segment = self.robot.segments, self.robot.offset_mm, length / self.robot.segments
-        if self._sliding:
+        if self._is_rod:
             turns, chords, shears = coordinates, segment * np.sinc(coordinates / (2 * np.pi)), np.zeros(n)
         else:
             sines = coordinates
@@ -175,18 +171,18 @@ class ReferenceSolver:
         return np.concatenate([backbone.ravel(), (backbone + disks[1:]).ravel()])
 
     def _free(self, cable: float, length: float) -> _Point:
-        """The shape that nothing touches."""
+        """Return the free robot, which nothing touches."""
         robot = self.robot.at(length)
-        angle = free_angle(robot, cable) if self._sliding else 0.0
+        angle = free_angle(robot, cable) if self._is_rod else 0.0
         straight = np.zeros(2 * sum(self.scene.mounted))
         unknowns = np.r_[self._shape(cable, length, np.full(robot.segments, angle)), straight]
-        multipliers = np.zeros(self._limits + self._touchable[:, :, 1:].size)
-        if self._sliding:
+        multipliers = np.zeros(self._robot_inequalities + self._touchable[:, :, 1:].size)
+        if self._is_rod:
             multipliers[0] = free_tension(robot, cable) / robot.energy_scale
         return self._balanced(cable, length, unknowns, multipliers)
 
     def _balanced(self, cable: float, length: float, unknowns: np.ndarray, multipliers: np.ndarray) -> _Point:
-        """A shape with multipliers of its inequalities, and those of the equalities by least squares."""
+        """Return a shape with the multipliers of its inequalities, and those of the equalities by least squares."""
         derivatives = node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
         values = derivatives(unknowns, self._parameters(cable, length))
         slope, _, equality_slopes, _, gap_slopes = (value.full() for value in values)
@@ -197,25 +193,26 @@ class ReferenceSolver:
     def check_command(
         self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
     ) -> tuple[float, float]:
-        """Return a command as floats; as :meth:`solver.Solver.check_command`.
+        """Return a command as floats, like :meth:`solver.Solver.check_command`.
 
         Raises:
             ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is something else.
+            TypeError: If ``equilibrium`` is not one of the plane.
         """
         return check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
 
     def _start(self, equilibrium: Equilibrium) -> _Point:
+        """Return an equilibrium as a solution of the node problem."""
         unknowns, _, tensions, multipliers = equilibrium.node_solution()
         return _Point(equilibrium.cable_mm, equilibrium.length_mm, unknowns, -np.concatenate([tensions, multipliers]))
 
     def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
-        """The solution under another command, ``None`` where IPOPT does not converge to it or leaves the branch."""
-        if cable < SLACK * self.robot.offset_mm and not self._sliding:
+        """Return the solution for another command, ``None`` where IPOPT does not converge or leaves the branch."""
+        if cable < SLACK * self.robot.offset_mm and not self._is_rod:
             return self._free(cable, length)
         scale = self._scale(cable)
         shape = self._shape(cable, length, self._pose(start.unknowns, start.length).coordinates)
-        guess = self._balanced(cable, length, np.r_[shape, self._mounts(start)], self._pushes(start))
+        guess = self._balanced(cable, length, np.r_[shape, self._mounts(start)], self._pushing(start))
         solution = self._nlp_solver(
             x0=guess.unknowns,
             lam_g0=guess.multipliers / scale,
@@ -225,15 +222,15 @@ class ReferenceSolver:
         )
         unknowns = solution["x"].full().ravel()
         moved = np.linalg.norm((unknowns - start.unknowns).reshape(-1, 2), axis=1).max()
-        allowed = self.robot.lengths_mm[1] * (MOVE_OFFSET + MOVE_SLOPE * self._apart(start, cable, length))
+        allowed = self.robot.lengths_mm[1] * (MOVE_OFFSET + MOVE_SLOPE * self._distance(start, cable, length))
         stats = self._nlp_solver.stats()
         if not (stats["success"] and moved <= allowed):
             return None
         multipliers = solution["lam_g"].full().ravel() * scale
-        return self._settled(_Point(cable, length, unknowns, multipliers, stats["iter_count"]), solution["g"])
+        return self._without_barrier(_Point(cable, length, unknowns, multipliers, stats["iter_count"]), solution["g"])
 
-    def _settled(self, point: _Point, constraints: ca.DM) -> _Point:
-        """Without the traces of the barrier: an interior-point method leaves every multiplier positive."""
+    def _without_barrier(self, point: _Point, constraints: ca.DM) -> _Point:
+        """Return a solution with inactive multipliers set to zero: an interior-point method leaves all positive."""
         gaps = constraints.full().ravel()
         multipliers = point.multipliers.copy()
         inactive = -multipliers / self._scale(point.cable) < np.abs(gaps)
@@ -242,12 +239,12 @@ class ReferenceSolver:
         return point._replace(multipliers=multipliers)
 
     def _limit(self, below: _Point, above: _Point) -> _Point:
-        """The tension limit between two points of the branch, from below, by bisection."""
+        """Return the tension limit between two points of the branch, from below, by bisection."""
         present, high = below, 1.0
-        low, span = 0.0, self._apart(below, above.cable, above.length)
+        low, span = 0.0, self._distance(below, above.cable, above.length)
         while (high - low) * span > RESOLUTION:
             middle = (low + high) / 2
-            point = self._between(below._replace(unknowns=present.unknowns), above.cable, above.length, middle)
+            point = self._solve_part(below._replace(unknowns=present.unknowns), above.cable, above.length, middle)
             if point is None:
                 break
             if self._tension(point) > self.robot.max_tension:
@@ -257,13 +254,16 @@ class ReferenceSolver:
         return present
 
     def _tension(self, point: _Point) -> float:
+        """Return the cable tension, by the envelope theorem [N]."""
         slope = self._cable_slope(point.unknowns, self._parameters(point.cable, point.length), point.multipliers)
         return self.robot.rigidity * self.robot.segments / (2 * point.length) * float(slope)
 
-    def _pushes(self, point: _Point) -> np.ndarray:
+    def _pushing(self, point: _Point) -> np.ndarray:
+        """Return the multipliers of the inequalities."""
         return -point.multipliers[3 * self.robot.segments :]
 
     def _mounts(self, point: _Point) -> np.ndarray:
+        """Return the displacements of the obstacles on springs."""
         return point.unknowns[4 * self.robot.segments :]
 
     def _pose(self, unknowns: np.ndarray, length: float) -> _Pose:
@@ -276,7 +276,7 @@ class ReferenceSolver:
         unsheared = angles[:-1] - turns / 2
         sideways = -np.sum(segments * np.column_stack([np.cos(unsheared), np.sin(unsheared)]), axis=1)
         sines = sideways * self.robot.segments / length
-        return _Pose(backbone, cable, angles, turns, turns if self._sliding else sines)
+        return _Pose(backbone, cable, angles, turns, turns if self._is_rod else sines)
 
     def _equilibrium(
         self, point: _Point, status: Status, iterations: int, before: Equilibrium | None = None
@@ -284,10 +284,11 @@ class ReferenceSolver:
         pose = self._pose(point.unknowns, point.length)
         nodes = np.column_stack([pose.backbone, pose.angles])
         multipliers = np.zeros(self._touchable.shape)
-        multipliers[:, :, 1:] = self._pushes(point)[self._limits :].reshape(multipliers[:, :, 1:].shape)
+        own, pushing = np.split(self._pushing(point), [self._robot_inequalities])
+        multipliers[:, :, 1:] = pushing.reshape(multipliers[:, :, 1:].shape)
         displacements = np.zeros((len(self.scene), 2))
         displacements[list(self.scene.mounted)] = self._mounts(point).reshape(-1, 2)
-        parts: list[Any] = [
+        parts: list[np.ndarray | list[float]] = [
             [point.cable, point.length, self._tension(point), np.sum(pose.turns**2)],
             pose.coordinates,
             nodes,
@@ -296,23 +297,23 @@ class ReferenceSolver:
             self._gaps(nodes, displacements),
             displacements,
         ]
-        places = layout(self.robot, len(self.scene))
-        block = np.zeros(places.size)
+        fields = layout(self.robot, len(self.scene))
+        block = np.zeros(fields.size)
         numbers = np.concatenate([np.ravel(part) for part in parts])
         block[: numbers.size] = numbers
         points = touching_points(self.robot, nodes)
         for j, obstacle in enumerate(self.scene):
             normals = obstacle.normal_at(points - displacements[j])
             energy_scale = self.robot.at(point.length).energy_scale
-            places.forces(block)[j] = energy_scale * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
-        places.force(block)[:] = places.forces(block).sum(axis=0)
-        places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
-        places.flags(block)[:] = (multipliers > 0).any(axis=0).ravel()
-        disks = self._pushes(point)[1 : self._limits].reshape(2, -1) if self._sliding else np.zeros((2, 0))
-        places.disk_multipliers(block)[:] = disks[0] - disks[1]
-        places.tip_slopes(block)[:] = tip_slopes(self.robot.at(point.length), point.cable)
+            fields.forces(block)[j] = energy_scale * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
+        fields.force(block)[:] = fields.forces(block).sum(axis=0)
+        fields.clearance(block)[:] = fields.gaps(block).min(initial=np.inf)
+        fields.flags(block)[:] = (multipliers > 0).any(axis=0).ravel()
+        disks = own[1:].reshape(2, -1)
+        fields.disk_multipliers(block)[:] = disks[0] - disks[1]
+        fields.tip_slopes(block)[:] = tip_slopes(self.robot.at(point.length), point.cable)
         now = Equilibrium(self.robot, self.scene, block.copy(), status, iterations)
-        places.onset(block)[0] = 0.0 if before is None else onset_tension(before, now)
+        fields.onset(block)[0] = 0.0 if before is None else onset_tension(before, now)
         return Equilibrium(self.robot, self.scene, block, status, iterations)
 
     def _gaps(self, nodes: np.ndarray, displacements: np.ndarray) -> np.ndarray:
@@ -321,7 +322,7 @@ class ReferenceSolver:
         gaps = np.reshape([obstacle.gap(points - shift) for obstacle, shift in moved], self._touchable.shape)
         return np.where(self._touchable, gaps, np.inf)
 
-    def _apart(self, point: _Point, cable: float, length: float) -> float:
-        """How far a command is, in displacements of the cable [a]."""
+    def _distance(self, point: _Point, cable: float, length: float) -> float:
+        """Return the distance of a command, in displacements of the cable [a]."""
         inserted = INSERTION * abs(length - point.length) / self.robot.lengths_mm[1]
         return max(abs(cable - point.cable) / self.robot.offset_mm, inserted)

@@ -1,18 +1,18 @@
-"""The robot: what the solver needs to know of it, validated once."""
+"""Description of the planar robot, validated on construction."""
 
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
-from solver.common.robot import OFFSETS, check_cable, check_numbers, check_points, check_scale
-from solver.common.validation import number, positive, sequence, shown
+from solver.common.robot import OFFSETS, check_cable_limit, check_fields, check_point_count, check_proportions
+from solver.common.validation import check_number, check_positive, check_sequence, refusal
 
 LINES = ("backbone", "cable", "rim")
 MODELS = ("paper", "rod")
-ANGLES = 64  # at which the longest edge of a bent segment is looked for
+ANGLES = 64  # samples in the search for the longest edge of a bent segment
 LEAST_LENGTH = 1e-3  # shortest over longest length
-THICKEST = 0.9  # a disk, over the segment at its shortest
+THICKEST = 0.9  # thickness of a disk, over the segment at its shortest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,16 +25,17 @@ class Robot:
         offset_mm: Distance a of the cable from the backbone [mm].
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tension, never the shape.
         max_tension: Cable tension the motor can hold [N]; ``math.inf`` lifts the limit.
-        max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, half a turn of the tip.
-        model: ``"paper"``, the paper's: every segment takes an equal share of the cable displacement and shears.
-            ``"rod"``: the cable slides through the disks without friction and can go slack, and segments are arcs
-            (Rao 2024); with more segments this robot tends to the elastica under a tendon of constant tension.
+        max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, which turns the tip by 180°, but at most
+            half the shortest length.
+        model: ``"paper"``, the model of the paper: every segment takes an equal share of the cable displacement and may
+            shear. ``"rod"``: the cable slides through the disks without friction and can go slack, and segments are
+            arcs (Rao 2024); with more segments this robot converges to the elastica under constant tendon tension.
         length_range_mm: Shortest and longest length the base can insert [mm]; ``None`` for a robot of fixed length.
-        touch: The lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and
-            ``"rim"``, the edge of the disks opposite to the cable.
-        between: Number of points of each line, evenly spaced between every two nodes, that can touch as well.
-        disk_radius_mm: Radius R of the disks, whose edges meet where a segment bends far [mm]; ``None`` stands for
-            ``offset_mm``. A uniform cable shears its segments before they bend as far.
+        touch: Lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and ``"rim"``,
+            the edge of the disks opposite to the cable.
+        between: Number of further points of each line, evenly spaced between every two nodes, that can touch.
+        disk_radius_mm: Radius R of the disks, whose edges meet where a segment of the rod bends far [mm]; ``None``
+            stands for ``offset_mm``. The paper's model shears before its segments bend so far.
         disk_thickness_mm: Thickness t of the disks [mm].
 
     Raises:
@@ -55,16 +56,15 @@ class Robot:
     disk_thickness_mm: float = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, LINES)
+        check_fields(self, LINES)
         if not (isinstance(self.model, str) and self.model in MODELS):
-            raise ValueError(f"model is {shown(self.model)}; it must be one of {', '.join(MODELS)}")
+            raise refusal("model", self.model, f"one of {', '.join(MODELS)}")
         self._check_lengths()
-        shortest, longest = self.lengths_mm
-        check_scale(self, longest)
+        check_proportions(self)
         self._check_disks()
-        check_points(self, len(self.touch) * self.positions)
-        check_cable(self, min(math.pi * self.offset_mm, 0.5 * shortest))
-        bound = min(shortest, 2 * self.segments * self.offset_mm)
+        check_point_count(self, len(self.touch) * self.positions)
+        check_cable_limit(self, min(math.pi * self.offset_mm, 0.5 * self.shortest_mm))
+        bound = min(self.shortest_mm, 2 * self.segments * self.offset_mm)
         if not self.cable_limit_mm < bound:
             raise ValueError(
                 f"max_cable_mm is {self.max_cable_mm}; it must be below {bound} "
@@ -75,20 +75,21 @@ class Robot:
         radius = self.offset_mm if self.disk_radius_mm is None else self.disk_radius_mm
         low, high = (ratio * self.longest_mm for ratio in OFFSETS)
         bound = f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length"
-        radius = number("disk_radius_mm", radius, low, high, bound)
+        radius = check_number("disk_radius_mm", radius, low, high, bound)
         most = THICKEST * self.shortest_mm / self.segments
         bound = f"from 0 to {most:.6g}, {THICKEST} of a segment's length"
-        thickness = number("disk_thickness_mm", self.disk_thickness_mm, 0.0, most, bound)
+        thickness = check_number("disk_thickness_mm", self.disk_thickness_mm, 0.0, most, bound)
         object.__setattr__(self, "disk_radius_mm", radius)
         object.__setattr__(self, "disk_thickness_mm", thickness)
 
     def _check_lengths(self) -> None:
         if self.length_range_mm is None:
             return
-        bounds = sequence("length_range_mm", self.length_range_mm, "a pair (shortest, longest) of lengths")
+        wanted = "a pair (shortest, longest) of lengths"
+        bounds = check_sequence("length_range_mm", self.length_range_mm, wanted)
         if len(bounds) != 2:
-            raise ValueError(f"length_range_mm is {shown(bounds)}; it must be a pair (shortest, longest) of lengths")
-        shortest, longest = (positive("a bound of length_range_mm", bound) for bound in bounds)
+            raise refusal("length_range_mm", bounds, wanted)
+        shortest, longest = (check_positive("a bound of length_range_mm", bound) for bound in bounds)
         object.__setattr__(self, "length_range_mm", (shortest, longest))
         if not shortest <= self.length_mm <= longest:
             raise ValueError(f"length_mm is {self.length_mm}; it must lie in length_range_mm {self.length_range_mm}")
@@ -100,15 +101,15 @@ class Robot:
 
     @classmethod
     def prototype(cls, *, max_tension: float = 15.0, segments: int = 18) -> "Robot":
-        """The paper's 3-D printed prototype: 180 mm, a = 8 mm, 18 segments.
+        """Return the paper's 3-D printed prototype: 180 mm, a = 8 mm, 18 segments.
 
-        The paper gives no rigidity. 5000 N·mm² is an assumption of this project: 350 gf on the cable then bend the
-        free robot by about 8 mm of cable displacement.
+        The paper gives no rigidity. 5000 N·mm² is an assumption of this project: a cable load of 350 gf then displaces
+        the cable of the free robot by about 8 mm.
         """
         return cls(length_mm=180.0, segments=segments, offset_mm=8.0, max_tension=max_tension)
 
     def at(self, length_mm: float) -> "Robot":
-        """The same robot, inserted to a length at rest [mm].
+        """Return the same robot, inserted to a length at rest [mm].
 
         Raises:
             ValueError: If the length is outside its range.
@@ -127,7 +128,7 @@ class Robot:
         if type(length_mm) is float and shortest <= length_mm <= longest:
             return length_mm
         bound = f"from {shortest:.6g} to {longest:.6g} (robot.length_range_mm)"
-        return number("length_mm", length_mm, shortest, longest, bound)
+        return check_number("length_mm", length_mm, shortest, longest, bound)
 
     @property
     def lengths_mm(self) -> tuple[float, float]:
@@ -151,9 +152,9 @@ class Robot:
 
     @property
     def lines_mm(self) -> tuple[float, ...]:
-        """Distance of the lines of ``touch`` from the backbone, towards the cable [mm]."""
-        place = {"backbone": 0.0, "cable": self.offset_mm, "rim": -self.offset_mm}
-        return tuple(place[line] for line in self.touch)
+        """Distances of the lines of ``touch`` from the backbone, towards the cable [mm]."""
+        distances = {"backbone": 0.0, "cable": self.offset_mm, "rim": -self.offset_mm}
+        return tuple(distances[line] for line in self.touch)
 
     @property
     def positions(self) -> int:
@@ -162,16 +163,16 @@ class Robot:
 
     @property
     def edges_mm(self) -> tuple[float, ...]:
-        """Longest distance there can be between neighbouring points of each line of ``touch`` [mm].
+        """Largest possible distance between neighbouring points of each line of ``touch`` [mm].
 
-        A line beside the backbone is stretched where its segment bends away from it: by an arc up to where the disks
-        meet, with a uniform cable by a shear up to where the cable has no more length to give.
+        A line beside the backbone is stretched where its segment bends away from it: in the rod by an arc up to where
+        the disks meet, in the paper's model by a shear up to where the cable has no more length to give.
         """
         return _longest_edges(self)
 
     @property
     def energy_scale(self) -> float:
-        """B = EI / 2 l0 [N·mm], which turns the objective J = Σθ² [rad²] into energy."""
+        """Scale B = EI / 2 l0 [N·mm] of the elastic energy, B times the objective J = Σθ² [rad²]."""
         return self.rigidity / (2 * self.segment_mm)
 
     @property

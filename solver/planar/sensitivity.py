@@ -1,7 +1,7 @@
-"""How an equilibrium changes with the cable, the length of the robot and its obstacles.
+"""Derivatives of an equilibrium in the cable displacement, the robot's length and its obstacles.
 
-The implicit function theorem at the active set: one factorisation of the optimality conditions of eq. 5, whose
-derivatives :mod:`solver.planar.formulation` gives, and one back-substitution a parameter.
+They follow from the implicit function theorem at the active set: one factorisation of the optimality conditions of
+eq. 5, whose derivatives are those of :mod:`solver.planar.formulation`, and one back-substitution for each parameter.
 """
 
 from dataclasses import dataclass
@@ -11,26 +11,26 @@ import numpy as np
 
 from solver.common.implicit import respond
 from solver.common.scene import MAX_OBSTACLES
-from solver.common.validation import instance, whole
+from solver.common.validation import check_instance, check_whole
 from solver.planar.equilibrium import Equilibrium
-from solver.planar.formulation import kkt_derivatives, limits
+from solver.planar.formulation import kkt_derivatives, robot_inequality_count
 
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """Derivatives of an equilibrium, the parameters along the first axis.
+    """Derivatives of an equilibrium, with the parameters along the first axis.
 
-    The parameters are the cable displacement [mm], the length of the backbone [mm], then of every obstacle its shift in
-    x and y [mm], its turn about its centre [rad] and the growth of its radius [mm]; q = 2 + 4m in all. The length
-    stretches all segments alike. Where a contact is about to open or close, the derivatives are those of the side on
-    which the active set stays as it is.
+    The parameters are the cable displacement [mm], the length of the backbone [mm], then for every obstacle its shift
+    in x and y [mm], its turn about its centre [rad] and the growth of its radius [mm]; q = 2 + 4m in all. The length
+    stretches all segments alike. Where a contact is about to open or close, the derivatives are one-sided: those for
+    an unchanged active set.
 
     Attributes:
-        nodes: Of the node poses, ``(q, n+1, 3)``.
-        multipliers: Of the multipliers, ``(q, m, p, k)`` [rad²/mm per unit]; zero where nothing touches.
-        tension: Of the cable tension, ``(q,)`` [N per unit].
-        forces: Of the force of each obstacle on the robot, ``(q, m, 2)`` [N per unit].
-        displacements: Of how far each obstacle has been pushed, ``(q, m, 2)`` [mm per unit].
+        nodes: Slopes of the node poses, ``(q, n+1, 3)``.
+        multipliers: Slopes of the multipliers, ``(q, m, p, k)`` [rad²/mm per unit]; zero where nothing touches.
+        tension: Slopes of the cable tension, ``(q,)`` [N per unit].
+        forces: Slopes of the force of each obstacle on the robot, ``(q, m, 2)`` [N per unit].
+        displacements: Slopes of the displacement of each obstacle on a spring, ``(q, m, 2)`` [mm per unit].
     """
 
     CABLE: ClassVar[int] = 0
@@ -44,12 +44,12 @@ class Sensitivity:
 
     @staticmethod
     def obstacle_rows(obstacle: int) -> slice:
-        """Return the rows that belong to an obstacle: x, y, turn, radius.
+        """Return the rows of an obstacle: x, y, turn, radius.
 
         Raises:
             ValueError: If it is not the index of an obstacle.
         """
-        obstacle = whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
+        obstacle = check_whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
         return slice(2 + 4 * obstacle, 6 + 4 * obstacle)
 
 
@@ -57,28 +57,26 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     """Differentiate an equilibrium with respect to every parameter.
 
     Args:
-        equilibrium: A stable equilibrium; with a uniform cable, some of it pulled, as a slack robot's shear is not
-            determined.
+        equilibrium: A stable equilibrium. In the paper's model the cable must be pulled, as the shear of a slack robot
+            is undetermined.
         active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier. Adding
             one that only just touches gives the derivative on the side where it is pressed.
 
     Raises:
-        ValueError: If a uniform cable is not pulled, or ``active`` has the wrong shape, or contacts that cannot all be
-            closed at once.
-        TypeError: If ``equilibrium`` is something else.
+        ValueError: If the cable of the paper's model is not pulled, or ``active`` has the wrong shape, or contacts that
+            cannot all be closed at once.
+        TypeError: If ``equilibrium`` is not one of the plane.
     """
-    instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
+    check_instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
     robot, scene = equilibrium.robot, equilibrium.scene
-    sliding = robot.model == "rod"
-    if not sliding and not equilibrium.cable_mm > 0:
+    if robot.model == "paper" and not equilibrium.cable_mm > 0:
         raise ValueError(f"cable_mm is {equilibrium.cable_mm}; it must be positive, for the shear to be determined")
     kkt = kkt_derivatives(robot, scene.laws, scene.mounted)
-    held = equilibrium.inequality_multipliers[: limits(robot)] > 0  # a taut cable, and disks that meet
-    change = respond(equilibrium, kkt, active, held.tolist())
+    closed = equilibrium.inequality_multipliers[: robot_inequality_count(robot)] > 0  # taut cable, disks that meet
+    change = respond(equilibrium, kkt, active, closed.tolist())
     load_changes = change.loads
     load_changes[Sensitivity.LENGTH] -= change.load / equilibrium.length_mm  # of the energy scale, EI·n / 2 L0
-    for rows in (change.unknowns, change.multipliers, load_changes):
-        _turn_about_centres(equilibrium, rows)
+    _turn_about_centres(equilibrium, change.unknowns, change.multipliers, load_changes)
     forces = load_changes[:, 2:].reshape(len(load_changes), len(scene), 4)[:, :, :2]
     displacements = np.zeros_like(forces)
     mounts = change.unknowns[:, 4 * robot.segments :]
@@ -92,16 +90,17 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
     )
 
 
-def _turn_about_centres(equilibrium: Equilibrium, slopes: np.ndarray) -> None:
-    """Make turns about the origin turns about each obstacle's centre, in place: they differ by a shift."""
-    for j, obstacle in enumerate(equilibrium.scene):
-        x, y = obstacle.extent.center
-        shift_x, shift_y, turn, _ = slopes[Sensitivity.obstacle_rows(j)]
-        turn += y * shift_x - x * shift_y
+def _turn_about_centres(equilibrium: Equilibrium, *slopes: np.ndarray) -> None:
+    """Convert turns about the origin to turns about each obstacle's centre, in place: they differ by a shift."""
+    for rows in slopes:
+        for j, obstacle in enumerate(equilibrium.scene):
+            x, y = obstacle.extent.center
+            shift_x, shift_y, turn, _ = rows[Sensitivity.obstacle_rows(j)]
+            turn += y * shift_x - x * shift_y
 
 
 def _node_slopes(equilibrium: Equilibrium, change: np.ndarray) -> np.ndarray:
-    """Slopes of the node poses from those of backbone and cable points, ``(q, n+1, 3)``."""
+    """Return the slopes of the node poses from those of backbone and cable points, ``(q, n+1, 3)``."""
     robot = equilibrium.robot
     points = change.reshape(len(change), 2, robot.segments, 2)
     disk = (equilibrium.cable_nodes - equilibrium.nodes[:, :2])[1:]

@@ -1,4 +1,4 @@
-"""The solver: one robot in one scene, its equilibria followed step by step."""
+"""Solver in the plane: follows the equilibria of one robot in one scene step by step."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import PLANE
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
-from solver.common.validation import number
+from solver.common.validation import check_number
 from solver.planar.equilibrium import Equilibrium
 from solver.planar.layout import layout, layout_model
 from solver.planar.robot import Robot
@@ -27,8 +27,8 @@ class Solver:
 
     Raises:
         ValueError: If an obstacle is one of space, overlaps the straight robot, is small enough to slip between its
-            points, names a node the robot does not have, or is out of all proportion to it.
-        TypeError: If the robot or the scene is something else.
+            points, names a node the robot does not have, or is out of proportion to the robot.
+        TypeError: If the robot or the scene is of the wrong class.
         RuntimeError: If a :class:`~solver.planar.custom.Custom` shape cannot be compiled.
     """
 
@@ -44,34 +44,34 @@ class Solver:
         check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> Equilibrium:
-        """The straight, unactuated robot."""
+        """Return the straight, unactuated robot."""
         return self._rest
 
     def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
         """Move the cable to a displacement, and the base to an insertion, as far as tension and obstacles allow.
 
         Args:
-            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
+            equilibrium: State to start from, of this solver or one of an equal robot and scene.
             cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
             length_mm: Commanded length of the backbone, within ``robot.length_range_mm`` [mm]; ``None`` keeps it. Both
-                commands are approached evenly.
+                are changed at proportional rates.
 
         Returns:
-            The equilibrium reached; its ``status`` says how. While anything touches, a uniform cable is not slackened
-            below a pretension of 0.00625 of ``robot.offset_mm``, where the shape would be undetermined; without it such
-            a robot is given up on where insertion meets an obstacle.
+            The equilibrium reached; its ``status`` tells how. While anything touches, the cable of the paper's model is
+            not slackened below a pretension of 0.00625 of ``robot.offset_mm``, where the shape would be undetermined;
+            a slack robot that is inserted into an obstacle ends in ``GAVE_UP``.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is something else.
+            TypeError: If ``equilibrium`` is not one of the plane.
         """
         cable_mm, length_mm = self.check_command(equilibrium, cable_mm, length_mm)
         return self._follow(equilibrium.block, cable_mm, length_mm)
 
     def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Trace:
-        """Every shape accepted on the way of :meth:`step`, from the present one on.
+        """Return every shape accepted on the way of :meth:`step`, beginning with the present one.
 
-        Shows what happens inside a step: its sub-steps, and the descent through a snap.
+        It shows what happens within a step: its sub-steps, and the descent through a snap.
 
         Raises:
             ValueError: As :meth:`step`.
@@ -80,7 +80,7 @@ class Solver:
         return read_trace(self._kernel.trace(equilibrium.block, (cable_mm, length_mm)), self.robot, self.scene, 2)
 
     def optimality(self, equilibrium: Equilibrium) -> Optimality:
-        """How well an equilibrium meets its conditions, computed anew by the kernel.
+        """Return the optimality residuals of an equilibrium, recomputed by the kernel.
 
         Raises:
             ValueError: If the equilibrium is another robot's or scene's.
@@ -91,11 +91,11 @@ class Solver:
     def check_command(
         self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
     ) -> tuple[float, float]:
-        """Return a command as floats, the present length where none is given.
+        """Return a command as floats, with the present length where none is given.
 
         Raises:
             ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is something else.
+            TypeError: If ``equilibrium`` is not one of the plane.
         """
         return check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
 
@@ -136,15 +136,15 @@ def kernel_scene(robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:
 def check_command(
     robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None
 ) -> tuple[float, float]:
-    """Refuse a command out of range and an equilibrium of another robot or scene; returns the command as floats.
+    """Return a command as floats, after checking it and the equilibrium it starts from.
 
     Raises:
-        ValueError: Naming the value and the bound.
-        TypeError: If the equilibrium is something else.
+        ValueError: If a command is out of range, or the equilibrium is another robot's or scene's.
+        TypeError: If the equilibrium is not one of the plane.
     """
     limit = robot.cable_limit_mm
     if not (type(cable_mm) is float and 0 < cable_mm <= limit):
-        cable_mm = number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+        cable_mm = check_number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
     check_origin(robot, scene, equilibrium, Equilibrium)
     if length_mm is None:
         return cable_mm, equilibrium.length_mm

@@ -1,12 +1,13 @@
-"""The robot in space (eq. 13): two cables, and obstacles all around."""
+"""The robot in space (eq. 13): two pairs of cables, and obstacles all around."""
 
+from solver.spatial.batch import SpatialBatchSolver
 from solver.spatial.equilibrium import SpatialEquilibrium
-from solver.spatial.forces import SpatialVirtualWork, force_true
+from solver.spatial.forces import SpatialVirtualWork, force_true, virtual_work, with_friction
 from solver.spatial.obstacles import Box, Capsule, Cylinder, HalfSpace, SpatialObstacle, Sphere
 from solver.spatial.reference import SpatialReferenceSolver
-from solver.spatial.robot import SpatialRobot
+from solver.spatial.robot import SpatialRobot, sides
 from solver.spatial.sensitivity import SpatialSensitivity, spatial_sensitivity
-from solver.spatial.solve import SpatialBatchSolver, SpatialSolver
+from solver.spatial.solve import SpatialSolver
 
 __all__ = [
     "Box",
@@ -23,5 +24,8 @@ __all__ = [
     "SpatialVirtualWork",
     "Sphere",
     "force_true",
+    "sides",
     "spatial_sensitivity",
+    "virtual_work",
+    "with_friction",
 ]

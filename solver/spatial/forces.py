@@ -1,37 +1,37 @@
-"""Contact force in space, read in two ways; see :mod:`solver.planar.forces`.
+"""Contact force in space, by energy and by virtual work.
 
-The energy force is that of the model, in any direction. The paper's virtual work is of the plane: one cable, one angle.
-Here it goes beyond the paper, to two cables. The free tip has one virtual displacement for each, and along both the
-work of the contact force is to balance that of the loads, ``c F·x'_k + Σ_j P_j M_jk = 0``, with the cable load P since
-the onset of the contact and M_jk the turn of the free tip towards cable j per displacement of cable k, times the
-offset. One unknown factor c of a known direction F meets both equations as well as can be, by least squares; the
-combination that counts is the one that moves the tip against the contact, in the plane of which this is eq. 10 of the
-paper. Friction is a ratio μ of the normal force along the way that the tip would slide on the surface in that motion.
+The energy force is that of the model, in any direction. The paper's virtual work is planar: one cable, one angle. Here
+it is extended to two cables. The free tip has one virtual displacement for each, and along both the work of the contact
+force balances that of the loads, ``c F·x'_k + Σ_j P_j M_jk = 0``, with the cable load P gained since the onset of
+contact and M_jk the turn of the free tip towards cable j per displacement of cable k, times the offset. The one unknown
+factor c of a known direction F fits both equations by least squares. Only the combination that moves the tip against
+the contact matters; in its plane this is eq. 10 of the paper. Friction adds the fraction μ of the normal force in the
+direction in which the tip would slide on the surface in that motion.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from solver.common.validation import finite, instance
+from solver.common.validation import check_finite, check_instance
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import sides
 
-TINY = 1e-300  # keeps quotients defined where nothing pushes
+TINY = 1e-300  # keeps quotients defined where nothing touches
 
 
 def force_true(equilibrium: SpatialEquilibrium) -> np.ndarray:
-    """Contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 3)`` [N]."""
-    instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
+    """Return the contact force by energy, ``F_j = EI / 2 l0 · λ_j ∇c_j``, ``(m, 3)`` [N]."""
+    check_instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
     return equilibrium.forces.copy()
 
 
 def with_friction(forces: np.ndarray, slopes: np.ndarray, friction: float) -> np.ndarray:
-    """Normal forces with friction beside them, along the way the free tip would slide on the surface, ``(..., 3)``.
+    """Return normal forces with friction added in the direction in which the free tip would slide, ``(..., 3)``.
 
     Args:
         forces: Normal forces, ``(..., 3)``.
-        slopes: Slopes of the free tip's place in both displacements, ``(..., 2, 3)``.
+        slopes: Slopes of the free tip's position in both displacements, ``(..., 2, 3)``.
         friction: Ratio μ of tangential to normal force.
     """
     size = _norm(forces)
@@ -43,9 +43,9 @@ def with_friction(forces: np.ndarray, slopes: np.ndarray, friction: float) -> np
 
 
 def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """How many times a force does the virtual work that the cable loads do: c as above, ``(...,)``.
+    """Return the factor c for which a force does the virtual work of the cable loads, ``(...,)``.
 
-    Zero for a force that does no work against the motion.
+    It is zero for a force that does no work against the motion.
 
     Args:
         forces: Forces, ``(..., 3)``.
@@ -60,7 +60,7 @@ def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> n
 
 @dataclass(frozen=True, slots=True)
 class SpatialVirtualWork:
-    """The virtual-work estimate in space; several obstacles share one unknown in proportion to their multipliers.
+    """The virtual-work estimator in space; several obstacles share one unknown in proportion to their multipliers.
 
     Attributes:
         friction: Ratio μ of tangential to normal force.
@@ -72,15 +72,15 @@ class SpatialVirtualWork:
     friction: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "friction", finite("friction", self.friction))
+        object.__setattr__(self, "friction", check_finite("friction", self.friction))
 
     def estimate(self, equilibrium: SpatialEquilibrium) -> np.ndarray:
-        """Estimated contact force, ``(m, 3)`` [N].
+        """Return the estimated contact force, ``(m, 3)`` [N].
 
         Raises:
-            TypeError: If ``equilibrium`` is something else.
+            TypeError: If ``equilibrium`` is not one in space.
         """
-        instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
+        check_instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
         slopes = equilibrium.tip_slopes
         forces = with_friction(equilibrium.forces, slopes[:, :3], self.friction)
         loads = sides(equilibrium.cables_mm) * equilibrium.tensions - equilibrium.onset_tensions
@@ -88,7 +88,7 @@ class SpatialVirtualWork:
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Along the last axis, term by term, so that the bits do not depend on how many there are."""
+    """Return dot products along the last axis, summed term by term: the bits do not depend on the batch size."""
     product = a * b
     total = product[..., 0]
     for k in range(1, product.shape[-1]):

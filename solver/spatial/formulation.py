@@ -1,30 +1,28 @@
-"""The mathematics of the robot in space (eq. 13), written once, in CasADi.
+"""Mathematics of the robot in space (eq. 13), stated once, in CasADi.
 
-A segment turns its upper disk by the rotation Q from the lower one. In the frame halfway between the two, its backbone
-is ``l0·s`` with a unit vector s, and the way of a hole h of the disk is ``l0·s + b × h``, where b lies along the axis
-of Q and is ``2 sin θ/2`` long. So the two cable lengths of eq. 13 are quadratic in b, and ``2 asin(|b × h| / 2a)`` is
-the angle between the disks that the objective counts. The controls of a segment are shear (the first two parts of s)
-and twist (the last part of b); the lengths of the cables then give its bending (the first two parts of b).
+A segment rotates its upper disk by Q from the lower one. In the frame halfway between the two, its backbone is ``l0·s``
+with a unit vector s, and a hole h of the disk is displaced by ``l0·s + b × h``, where b lies along the axis of Q and is
+``2 sin θ/2`` long. So the two cable lengths of eq. 13 are quadratic in b, and ``2 asin(|b × h| / 2a)`` is the angle
+between the disks in the objective. The controls of a segment are shear (the first two components of s) and twist (the
+last component of b); the cable lengths then determine its bending (the first two components of b).
 """
 
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import NamedTuple
 
 import casadi as ca
 
 from solver.common.gap_laws import TINY, GapLaw, capsule_gap, circle_gap, gaps_of, half_plane_gap
-from solver.common.node_problem import NodeProblem, divided, norms
+from solver.common.node_problem import NodeProblem, first_derivatives, grow, norms, second_derivatives, subdivide
+from solver.spatial.robot import SpatialRobot
 
-if TYPE_CHECKING:  # the build runs this file without the package
-    from solver.spatial.robot import SpatialRobot
-
-HALVINGS, SERIES_TERMS = (
-    2,
-    12,
-)  # of an angle, and of the power series of its square: to the last digit for a quarter turn
+# Halvings of an angle, and terms of the power series of its square: exact to the last digit for a quarter turn.
+HALVINGS, SERIES_TERMS = 2, 12
+MOTIONS = 7  # components of an obstacle's change: shift, turns, growth
 
 
 def cylinder_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a cylinder with rounded edges ``shape = (center, axis, radius and half-length of core, edge radius)``."""
+    """Return the gap to a rounded cylinder ``shape = (center, axis, radius and half-length of core, edge radius)``."""
     offset, axis = point - shape[:3], shape[3:6]
     along = ca.dot(offset, axis)
     across = ca.sqrt(ca.sumsqr(offset - along * axis) + TINY)
@@ -32,13 +30,13 @@ def cylinder_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
 
 
 def box_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
-    """Gap to a box with rounded edges ``shape = (center, three axes, half-sizes of its core, edge radius)``."""
+    """Return the gap to a rounded box ``shape = (center, three axes, half-sizes of its core, edge radius)``."""
     local = ca.reshape(shape[3:12], 3, 3).T @ (point - shape[:3])
     return _beyond(ca.fabs(local) - shape[12:15]) - shape[15]
 
 
 def _beyond(excess: ca.SX) -> ca.SX:
-    """Distance of a point from a core that it is beyond by these lengths, across its faces."""
+    """Return the distance of a point from a core, of which it is outside by ``excess`` across each face."""
     outside = ca.sqrt(ca.sumsqr(ca.fmax(excess, 0)) + TINY)
     return ca.if_else(ca.mmax(excess) > 0, outside, ca.mmax(excess))
 
@@ -52,32 +50,32 @@ GAP_LAWS = (SPHERE, HALF_SPACE, CAPSULE, CYLINDER, BOX)
 
 
 def square_angle(square: ca.SX, halvings: int = HALVINGS) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """``θ² = (2 asin √q)²`` in the square q of the half sine of an angle up to π/2, and its first two derivatives.
+    """Return ``θ² = (2 asin √q)²`` of the squared half sine q of an angle up to π/2, and its first two derivatives.
 
-    By the power series of a quarter of the angle; halving it turns q into ``(1 − √(1 − q)) / 2``.
+    It is the power series of a quarter of the angle; halving the angle turns q into ``(1 − √(1 − q)) / 2``.
     """
     if halvings == 0:
         coefficient, coefficients = 4.0, []
         for k in range(1, SERIES_TERMS + 1):
             coefficients.append((k, coefficient))
             coefficient *= 2 * k * k / ((k + 1) * (2 * k + 1))
-        value = slope = bend = ca.SX(0)
+        value = slope = curvature = ca.SX(0)
         for k, c in reversed(coefficients):
             value, slope = c + square * value, k * c + square * slope
-            bend = k * (k - 1) * c + square * bend if k > 1 else bend
-        return square * value, slope, bend
+            curvature = k * (k - 1) * c + square * curvature if k > 1 else curvature
+        return square * value, slope, curvature
     cosine = ca.sqrt(1 - square)
-    value, slope, bend = square_angle(square / (2 * (1 + cosine)), halvings - 1)
-    return 4 * value, slope / cosine, (bend / 4 + slope / (2 * cosine)) / (1 - square)
+    value, slope, curvature = square_angle(square / (2 * (1 + cosine)), halvings - 1)
+    return 4 * value, slope / cosine, (curvature / 4 + slope / (2 * cosine)) / (1 - square)
 
 
 class _Segment:
-    """A segment in its controls, its bending, and what it is told."""
+    """Symbols of a segment: controls, bending, cable displacements, length and holes, and what follows from them."""
 
     def __init__(self) -> None:
         self.control, self.bending = ca.SX.sym("control", 3), ca.SX.sym("bending", 2)
         self.pulls, self.length, self.holes = ca.SX.sym("pulls", 2), ca.SX.sym("length"), ca.SX.sym("holes", 2, 2)
-        self.told = [self.control, self.bending, self.pulls, self.length, self.holes]
+        self.inputs = [self.control, self.bending, self.pulls, self.length, self.holes]
         shear, twist = self.control[:2], self.control[2]
         self.axis = ca.vertcat(self.bending, twist)
         self.along = ca.vertcat(shear, ca.sqrt(1 - ca.sumsqr(shear)))
@@ -86,53 +84,53 @@ class _Segment:
 
     @property
     def closure(self) -> ca.SX:
-        """Squares of the cable lengths less their values, over twice the backbone: zero at its shape, ``(2,)`` [mm]."""
+        """Squared cable lengths minus their values, over twice the backbone: zero at its shape, ``(2,)`` [mm]."""
         per_length = 1 / (2 * self.length)
         squares = [ca.dot(self.along, way) + ca.sumsqr(way) * per_length for way in self.ways]
         return ca.vertcat(*squares) + self.pulls * (1 - self.pulls * per_length)
 
     @property
     def squares(self) -> ca.SX:
-        """Squares of the half sines of the angles between the disks, towards both holes, ``(2,)``."""
+        """Squared half sines of the angles between the disks, towards both holes, ``(2,)``."""
         return ca.vertcat(*(ca.sumsqr(way) for way in self.ways)) / (4 * ca.sumsqr(self.holes[:, 0]))
 
     @property
     def chord(self) -> ca.SX:
         """Backbone in the frame of the lower disk, ``(3,)`` [mm]."""
         half = ca.sqrt((1 + self.cosine) / 2)
-        return self.length * _turned(half, self.axis / (4 * half), self.along)
+        return self.length * _rotate(half, self.axis / (4 * half), self.along)
 
     @property
     def rotation(self) -> ca.SX:
-        """From the upper disk's frame to the lower one's, ``(3, 3)``."""
-        return ca.horzcat(*(_turned(self.cosine, self.axis / 2, ca.SX.eye(3)[:, k]) for k in range(3)))
+        """Rotation from the upper disk's frame to the lower one's, ``(3, 3)``."""
+        return ca.horzcat(*(_rotate(self.cosine, self.axis / 2, ca.SX.eye(3)[:, k]) for k in range(3)))
 
     @property
     def turning(self) -> ca.SX:
-        """Turn of the upper disk in the frame of the lower one, per change of ``axis``, ``(3, 3)``."""
+        """Rotation of the upper disk in the frame of the lower one, per change of ``axis``, ``(3, 3)``."""
         stretched = self.cosine * ca.SX.eye(3) + self.axis @ self.axis.T / (4 * self.cosine)
         return stretched + ca.skew(self.axis) / 2
 
 
-def _turned(cosine: ca.SX, sine: ca.SX, vector: ca.SX) -> ca.SX:
-    """A vector turned by a unit quaternion."""
+def _rotate(cosine: ca.SX, sine: ca.SX, vector: ca.SX) -> ca.SX:
+    """Return a vector rotated by a unit quaternion."""
     across = 2 * ca.cross(sine, vector)
     return vector + cosine * across + ca.cross(sine, across)
 
 
 def closure_function() -> ca.Function:
-    """``(control, bending, pulls, l0, holes) → closure, its slope in the bending, row by row``."""
+    """Return ``(control, bending, pulls, l0, holes) → closure, its slope in the bending, row by row``."""
     segment = _Segment()
     slope = ca.jacobian(segment.closure, segment.bending)
     law = ca.vertcat(segment.closure, ca.vec(slope.T))
-    return ca.Function("ccr_closure", segment.told, [ca.cse(ca.densify(law))])
+    return ca.Function("ccr_closure", segment.inputs, [ca.cse(ca.densify(law))])
 
 
 def bend_function() -> ca.Function:
-    """``(control, bending, pulls, l0, holes) → chord, rotation, objective`` and their slopes, matrices row by row.
+    """Return ``(control, bending, pulls, l0, holes) → chord, rotation, objective`` and their slopes, row by row.
 
-    The slopes are those of the objective, of the chord and of the turn of the upper disk, all in the frame of the lower
-    one: first in the control, then in the pulls, with the bending that the closure gives.
+    The slopes are those of the objective, of the chord and of the rotation of the upper disk, all in the frame of the
+    lower one: first in the control, then in the pulls, with the bending that the closure determines.
     """
     segment = _Segment()
     bending, inverse = segment.bending, _inverse(ca.jacobian(segment.closure, segment.bending))
@@ -141,73 +139,73 @@ def bend_function() -> ca.Function:
     )
     outputs = [segment.chord, ca.vec(segment.rotation.T), ca.sum1(values)]
     for inputs in (segment.control, segment.pulls):
-        bent = -inverse @ ca.jacobian(segment.closure, inputs)
+        bending_slope = -inverse @ ca.jacobian(segment.closure, inputs)
         squares, chord, axis = (
-            ca.jacobian(what, inputs) + ca.jacobian(what, bending) @ bent
-            for what in (segment.squares, segment.chord, segment.axis)
+            ca.jacobian(value, inputs) + ca.jacobian(value, bending) @ bending_slope
+            for value in (segment.squares, segment.chord, segment.axis)
         )
         outputs += [ca.vec(slope.T) for slope in (rates.T @ squares, chord, segment.turning @ axis)]
-    return ca.Function("ccr_bend", segment.told, [ca.cse(ca.densify(ca.vertcat(*outputs)))])
+    return ca.Function("ccr_bend", segment.inputs, [ca.cse(ca.densify(ca.vertcat(*outputs)))])
 
 
 def hessian_contraction_function() -> ca.Function:
-    """``(control, bending, pulls, l0, holes, force, moment) → Hessian in the control, row by row``, ``(9,)``.
+    """Return ``(control, bending, pulls, l0, holes, force, moment) → Hessian in the control, row by row``, ``(9,)``.
 
-    Of the objective and the work of a force on the chord and a moment on the turn of the upper disk, in the frame of
-    the lower one, with the bending that the closure gives.
+    It is the Hessian of the objective, the work of a force on the chord and of a moment on the rotation of the upper
+    disk, in the frame of the lower one, with the bending that the closure determines.
     """
     segment, force, moment = _Segment(), ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
     control, bending = segment.control, segment.bending
     both = ca.vertcat(control, bending)
-    squares, held, rated = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
-    _, rates, bends = (
+    squares, multipliers, weights = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
+    _, rates, curvatures = (
         ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True)
     )
-    work = ca.dot(rated, squares) + ca.dot(force, segment.chord)
+    work = ca.dot(weights, squares) + ca.dot(force, segment.chord)
     axis = ca.jacobian(segment.axis, both)
     moments = axis.T @ segment.turning.T @ moment  # slope of the work of the moment
     inverse = _inverse(ca.jacobian(segment.closure, bending))
     lengths = inverse.T @ (ca.gradient(work, bending) + moments[3:])
-    hessian, _ = ca.hessian(work - ca.dot(held, segment.closure), both)
-    hessian = ca.substitute(hessian, held, lengths)
-    hessian = ca.substitute(hessian, rated, rates)
-    turned, steep = ca.jacobian(moments, both), ca.jacobian(squares, both)
-    hessian += (turned + turned.T) / 2 + steep.T @ ca.diag(bends) @ steep
+    hessian, _ = ca.hessian(work - ca.dot(multipliers, segment.closure), both)
+    hessian = ca.substitute(hessian, multipliers, lengths)
+    hessian = ca.substitute(hessian, weights, rates)
+    moment_slope, square_slope = ca.jacobian(moments, both), ca.jacobian(squares, both)
+    hessian += (moment_slope + moment_slope.T) / 2 + square_slope.T @ ca.diag(curvatures) @ square_slope
     along = ca.vertcat(ca.SX.eye(3), -inverse @ ca.jacobian(segment.closure, control))
     law = ca.vec(along.T @ hessian @ along)
-    return ca.Function("ccr_hessian_contraction", [*segment.told, force, moment], [ca.cse(ca.densify(law))])
+    return ca.Function("ccr_hessian_contraction", [*segment.inputs, force, moment], [ca.cse(ca.densify(law))])
 
 
 def _inverse(matrix: ca.SX) -> ca.SX:
+    """Return the inverse of a 2 × 2 matrix."""
     (a, b), (c, d) = ca.vertsplit(matrix[0, :].T), ca.vertsplit(matrix[1, :].T)
     return ca.vertcat(ca.horzcat(d, -b), ca.horzcat(-c, a)) / (a * d - b * c)
 
 
-def spatial_problem(
-    robot: "SpatialRobot", laws: tuple[GapLaw, ...], mounted: tuple[bool, ...], change: ca.MX | None = None
+def node_problem(
+    robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...], change: ca.MX | None = None
 ) -> NodeProblem:
     """Build eq. 13 for a robot and obstacles of given kinds.
 
     The first cable lies on the side of the first hole where its displacement is positive, else opposite; so does the
-    second. What stands for a hole below is the one that is pulled.
+    second. A hole below is always that of the cable that is pulled.
 
     Args:
         robot: The robot.
         laws: Gap laws of the obstacles.
         mounted: Which obstacles are on springs.
-        change: Of both displacements and the length, then of each obstacle its motion (shift, turns about the axes
-            through the origin, growth), ``(3 + 7m,)`` [mm, rad]; ``None`` for none.
+        change: Change of both displacements and the length, then of each obstacle its motion (shift, turns about the
+            axes through the origin, growth), ``(3 + 7m,)`` [mm, rad]; ``None`` for none.
 
     Returns:
-        ``unknowns``: backbone points, first and second holes of nodes 1…n, then the displacements of the obstacles on
-        springs, each as x, y, z triples, ``(9n + 3s,)`` [mm]. ``parameters``: ``(l1, l2, L0, EI)``, the shapes of the
-        obstacles, one after the other, and the six upper entries of the stiffness of those on springs. ``objective``:
-        sum of squared angles between consecutive disks, towards both holes, and the energy of the springs over
-        ``B = EI / 2 l0`` [rad²]. ``equalities``: zero when lengths of backbone, cables and disks, and the angle between
-        the holes, are as given, ``(6n,)`` [mm]. ``inequalities``: gap of every point that can touch, but for node 0, to
-        every obstacle, ordered (obstacle, line, position) [mm].
+        The problem. ``unknowns``: backbone points, first and second holes of nodes 1…n, then the displacements of the
+        obstacles on springs, each as x, y, z triples, ``(9n + 3s,)`` [mm]. ``parameters``: ``(l1, l2, L0, EI)``, the
+        shapes of the obstacles, one after the other, and the six upper entries of the stiffness of those on springs.
+        ``objective``: sum of squared angles between consecutive disks, towards both holes, and the energy of the
+        springs over ``B = EI / 2 l0`` [rad²]. ``equalities``: zero when lengths of backbone, cables and disks, and the
+        angle between the holes, are as given, ``(6n,)`` [mm]. ``inequalities``: gaps to obstacles [mm].
     """
-    n, a = robot.segments, robot.offset_mm
+    n = robot.segments
     unknowns = ca.MX.sym("unknowns", 9 * n + 3 * sum(mounted))
     sizes = [law.size for law in laws]
     parameters = ca.MX.sym("parameters", 4 + sum(sizes) + 6 * sum(mounted))
@@ -215,42 +213,89 @@ def spatial_problem(
     springs = ca.reshape(parameters[4 + sum(sizes) :], 6, -1)
     commands = parameters[:3] if change is None else parameters[:3] + change[:3]
     total = commands[2]
-    sides = [ca.if_else(parameters[k] < 0, -1.0, 1.0) for k in range(2)]
-    bases = [ca.MX.zeros(3), *(side * ca.DM(hole) for side, hole in zip(sides, robot.holes, strict=True))]
-    lines = [ca.horzcat(base, ca.reshape(unknowns[3 * n * k : 3 * n * (k + 1)], 3, n)) for k, base in enumerate(bases)]
-    disks = [line - lines[0] for line in lines[1:]]
-    shares = [total / n, *((total - side * commands[k]) / n for k, side in enumerate(sides))]
-    equalities = [norms(line[:, 1:] - line[:, :-1]) - share for line, share in zip(lines, shares, strict=True)]
-    equalities += [norms(disk[:, 1:]) - a for disk in disks]
-    between = sides[0] * sides[1] * ca.cos(robot.angle)
-    equalities.append(ca.sum1(disks[0][:, 1:] * disks[1][:, 1:]) / a - a * between)
-    energy = ca.sum2(_square_angles(disks[0], a)) + ca.sum2(_square_angles(disks[1], a))
-    holes = [side * disk for side, disk in zip(sides, disks, strict=True)]
+    signs = [ca.if_else(parameters[k] < 0, -1.0, 1.0) for k in range(2)]
+    pose = _pose(robot, unknowns, signs)
     displacements = ca.reshape(unknowns[9 * n :], 3, -1)
+    energy = ca.sum2(_square_angles(pose.disks[0], robot.offset_mm))
+    energy += ca.sum2(_square_angles(pose.disks[1], robot.offset_mm))
     gaps = []
     for j, law in enumerate(laws):
-        shape, shift, turn = shapes[j], ca.MX.zeros(3), ca.MX.eye(3)
-        if change is not None:
-            moved = change[3 + 7 * j : 10 + 7 * j]
-            shift, turn = moved[:3], ca.MX.eye(3) + ca.skew(moved[3:6]) + ca.skew(moved[3:6]) @ ca.skew(moved[3:6]) / 2
-            shape = shape + moved[6] * ca.DM([k in law.growth for k in range(law.size)])
+        own = None if change is None else change[3 + MOTIONS * j : 3 + MOTIONS * (j + 1)]
+        shape, shift, turn = _moved(law, shapes[j], own)
         if mounted[j]:
             mount = sum(mounted[:j])
-            push, (xx, xy, xz, yy, yz, zz) = displacements[:, mount], ca.vertsplit(springs[:, mount])
-            spring = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
-            energy += ca.dot(push, spring @ push) / (parameters[3] * n / total)
-            shift = shift + push
-        for along_first, along_second in robot.line_weights:
-            line = lines[0] + along_first * holes[0] + along_second * holes[1]
-            points = divided(line, robot.between)[:, 1:]
+            moved = displacements[:, mount]
+            energy += _twice_spring_energy(springs[:, mount], moved) / (parameters[3] * n / total)
+            shift = shift + moved
+        for line in pose.touching_lines(robot):
+            points = subdivide(line, robot.between)[:, 1:]
             gaps.append(gaps_of(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
-    return NodeProblem(
-        unknowns, parameters, energy, ca.horzcat(*equalities).T, ca.vertcat(*gaps) if gaps else ca.MX(0, 1)
-    )
+    inequalities = ca.vertcat(*gaps) if gaps else ca.MX(0, 1)
+    return NodeProblem(unknowns, parameters, energy, _equalities(robot, pose, signs, commands), inequalities)
+
+
+class _Pose(NamedTuple):
+    """Backbone and holes at nodes 0…n, the disks between them, and where the holes of the first cables are."""
+
+    lines: list[ca.MX]
+    disks: list[ca.MX]
+    holes: list[ca.MX]
+
+    def touching_lines(self, robot: SpatialRobot) -> list[ca.MX]:
+        """Return the lines of points that can touch."""
+        weights = robot.line_weights
+        return [self.lines[0] + first * self.holes[0] + second * self.holes[1] for first, second in weights]
+
+
+def _pose(robot: SpatialRobot, unknowns: ca.MX, signs: list[ca.MX]) -> _Pose:
+    n = robot.segments
+    bases = [ca.MX.zeros(3), *(sign * ca.DM(hole) for sign, hole in zip(signs, robot.holes, strict=True))]
+    lines = [ca.horzcat(base, ca.reshape(unknowns[3 * n * k : 3 * n * (k + 1)], 3, n)) for k, base in enumerate(bases)]
+    disks = [line - lines[0] for line in lines[1:]]
+    return _Pose(lines, disks, [sign * disk for sign, disk in zip(signs, disks, strict=True)])
+
+
+def _equalities(robot: SpatialRobot, pose: _Pose, signs: list[ca.MX], commands: ca.MX) -> ca.MX:
+    """Return lengths of backbone, cables and disks, and the product of the holes, minus their values, ``(6n,)``."""
+    n, a, total = robot.segments, robot.offset_mm, commands[2]
+    shares = [total / n, *((total - sign * commands[k]) / n for k, sign in enumerate(signs))]
+    equalities = [norms(line[:, 1:] - line[:, :-1]) - share for line, share in zip(pose.lines, shares, strict=True)]
+    equalities += [norms(disk[:, 1:]) - a for disk in pose.disks]
+    between = signs[0] * signs[1] * ca.cos(robot.angle)
+    equalities.append(ca.sum1(pose.disks[0][:, 1:] * pose.disks[1][:, 1:]) / a - a * between)
+    return ca.horzcat(*equalities).T
 
 
 def _square_angles(disk: ca.MX, offset: float) -> ca.MX:
-    """Squared angles between consecutive columns of equal length, ``(1, n)``, smooth where they vanish."""
+    """Return squared angles between consecutive columns of equal length, ``(1, n)``, smooth where they vanish."""
     square = ca.SX.sym("square")
     law = ca.Function("square_angle", [square], [square_angle(square)[0]])
     return law(ca.sum1((disk[:, 1:] - disk[:, :-1]) ** 2) / (4 * offset**2))
+
+
+def _moved(law: GapLaw, shape: ca.MX, change: ca.MX | None) -> tuple[ca.MX, ca.MX, ca.MX]:
+    """Return the shape, shift and rotation of an obstacle after a change of its own, to second order in the turns."""
+    if change is None:
+        return shape, ca.MX.zeros(3), ca.MX.eye(3)
+    turns = ca.skew(change[3:6])
+    return grow(law, shape, change[6]), change[:3], ca.MX.eye(3) + turns + turns @ turns / 2
+
+
+def _twice_spring_energy(spring: ca.MX, moved: ca.MX) -> ca.MX:
+    """Return twice the energy of a spring, given by its six upper entries [N·mm]."""
+    xx, xy, xz, yy, yz, zz = ca.vertsplit(spring)
+    matrix = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
+    return ca.dot(moved, matrix @ moved)
+
+
+@lru_cache(maxsize=32)
+def node_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
+    """Return the :func:`~solver.common.node_problem.first_derivatives` of :func:`node_problem`."""
+    return first_derivatives(node_problem(robot, laws, mounted))
+
+
+@lru_cache(maxsize=32)
+def kkt_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
+    """Return the :func:`~solver.common.node_problem.second_derivatives` of :func:`node_problem`."""
+    change = ca.MX.sym("change", 3 + MOTIONS * len(laws))
+    return second_derivatives(node_problem(robot, laws, mounted, change), change)

@@ -1,4 +1,4 @@
-"""Obstacles of space, validated once."""
+"""Obstacles of space, validated on construction."""
 
 import math
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.common.gap_laws import GapLaw
 from solver.common.obstacle import Extent, Obstacle
-from solver.common.validation import SMALLEST, Point, direction, point, positive
+from solver.common.validation import SMALLEST, Point, check_direction, check_point, check_positive
 from solver.spatial.formulation import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
 
 PARALLEL = 1e-6  # sine of the least angle between the axes of a box
@@ -40,25 +40,25 @@ class Sphere(SpatialObstacle):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(x, y, z, r)."""
+        """Parameters (x, y, z, r) of the gap law."""
         return (*self.center, self.radius)
 
     @property
     def extent(self) -> Extent:
-        """The ball itself."""
+        """Size of the ball."""
         return Extent(self.center, self.radius, self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
-        """Points of the sphere, ``(u, v, 3)`` [mm]."""
+        """Return points of the sphere, ``(u, v, 3)`` [mm]."""
         return np.asarray(self.center + self.radius * _ball(np.eye(3)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HalfSpace(SpatialObstacle):
-    """A flat wall, or with ``nodes`` a load cell, which only the named nodes meet.
+    """A flat wall, or with ``nodes`` a load cell, which only the named nodes touch.
 
     Attributes:
-        point: A point (x, y, z) of its surface [mm].
+        point: A point (x, y, z) of the surface [mm].
         normal: Outward normal, from the wall towards the robot; normalised on construction.
 
     Raises:
@@ -66,39 +66,39 @@ class HalfSpace(SpatialObstacle):
     """
 
     law: ClassVar[GapLaw] = HALF_SPACE
-    places: ClassVar[tuple[str, ...]] = ("point",)
-    lengths: ClassVar[tuple[str, ...]] = ()
+    point_fields: ClassVar[tuple[str, ...]] = ("point",)
+    size_fields: ClassVar[tuple[str, ...]] = ()
 
     point: Point
     normal: Point
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "normal", direction("normal", self.normal, "from the wall towards the robot", 3))
+        object.__setattr__(self, "normal", check_direction("normal", self.normal, "from the wall towards the robot", 3))
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(nx, ny, nz, offset)."""
+        """Parameters (nx, ny, nz, offset) of the gap law."""
         return (*self.normal, float(np.dot(self.normal, self.point)))
 
     @property
     def extent(self) -> Extent:
-        """Without bounds, and flat."""
+        """Size of the half-space, which is unbounded and flat."""
         return Extent(self.point, math.inf, math.inf, math.inf)
 
     def outline(self) -> np.ndarray:
-        """Corners of a square of the surface around the point, 60 mm wide, ``(2, 2, 3)`` [mm]."""
+        """Return the corners of a square of the surface around the point, 60 mm wide, ``(2, 2, 3)`` [mm]."""
         _, first, second = _axes(np.array(self.normal))
-        sides = np.array([-30.0, 30.0])
-        return np.asarray(self.point + sides[:, None, None] * first + sides[None, :, None] * second)
+        ends = np.array([-30.0, 30.0])
+        return np.asarray(self.point + ends[:, None, None] * first + ends[None, :, None] * second)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capsule(SpatialObstacle):
-    """All points within a radius of a line: a rod, a rounded bar.
+    """All points within a radius of a line segment: a round-ended bar.
 
     Attributes:
-        start: One end (x, y, z) of the line [mm].
+        start: One end (x, y, z) of the line segment [mm].
         end: Its other end [mm].
         radius: The radius [mm].
 
@@ -107,7 +107,7 @@ class Capsule(SpatialObstacle):
     """
 
     law: ClassVar[GapLaw] = CAPSULE
-    places: ClassVar[tuple[str, ...]] = ("start", "end")
+    point_fields: ClassVar[tuple[str, ...]] = ("start", "end")
 
     start: Point
     end: Point
@@ -119,17 +119,17 @@ class Capsule(SpatialObstacle):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(start, end, r)."""
+        """Parameters (start, end, r) of the gap law."""
         return (*self.start, *self.end, self.radius)
 
     @property
     def extent(self) -> Extent:
-        """The ball about the middle of the line."""
+        """Ball about the middle of the line segment."""
         center, half = _middle(self.start, self.end)
         return Extent(center, half + self.radius, self.radius, self.radius)
 
     def outline(self) -> np.ndarray:
-        """Points of its surface, ``(u, v, 3)`` [mm]."""
+        """Return points of the surface, ``(u, v, 3)`` [mm]."""
         axis = np.subtract(self.end, self.start)
         ball = _ball(_axes(axis / np.linalg.norm(axis)))
         ends = np.where(ball @ axis > 0, 1.0, 0.0)[..., None]
@@ -151,8 +151,8 @@ class Cylinder(SpatialObstacle):
     """
 
     law: ClassVar[GapLaw] = CYLINDER
-    places: ClassVar[tuple[str, ...]] = ("start", "end")
-    lengths: ClassVar[tuple[str, ...]] = ("radius", "edge")
+    point_fields: ClassVar[tuple[str, ...]] = ("start", "end")
+    size_fields: ClassVar[tuple[str, ...]] = ("radius", "edge")
 
     start: Point
     end: Point
@@ -168,19 +168,19 @@ class Cylinder(SpatialObstacle):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(center, axis, radius and half-length of the core, edge radius)."""
+        """Parameters (center, axis, radius and half-length of the core, edge radius) of the gap law."""
         center, half = _middle(self.start, self.end)
         axis = np.subtract(self.end, self.start) / (2 * half)
         return (*center, *axis.tolist(), self.radius - self.edge, half - self.edge, self.edge)
 
     @property
     def extent(self) -> Extent:
-        """The ball about its middle."""
+        """Ball about the middle of the cylinder."""
         center, half = _middle(self.start, self.end)
         return Extent(center, math.hypot(half, self.radius), min(half, self.radius), self.edge)
 
     def outline(self) -> np.ndarray:
-        """Points of its surface, ``(u, v, 3)`` [mm]."""
+        """Return points of the surface, ``(u, v, 3)`` [mm]."""
         _, half = _middle(self.start, self.end)
         axis, first, second = _axes(np.subtract(self.end, self.start) / (2 * half))
         turns = np.linspace(0, 2 * math.pi, 33)
@@ -205,7 +205,7 @@ class Box(SpatialObstacle):
     """
 
     law: ClassVar[GapLaw] = BOX
-    lengths: ClassVar[tuple[str, ...]] = ("edge",)
+    size_fields: ClassVar[tuple[str, ...]] = ("edge",)
 
     center: Point
     sizes: Point
@@ -215,20 +215,20 @@ class Box(SpatialObstacle):
 
     def __post_init__(self) -> None:
         Obstacle.__post_init__(self)
-        object.__setattr__(self, "sizes", point("sizes", self.sizes, 3))
+        object.__setattr__(self, "sizes", check_point("sizes", self.sizes, 3))
         for size in self.sizes:
-            positive("a size", size)
+            check_positive("a size", size)
         if self.edge > min(self.sizes) / 2:
             raise ValueError(
                 f"edge is {self.edge}; it must be at most {min(self.sizes) / 2:.6g}, half the smallest size"
             )
-        object.__setattr__(self, "axis", direction("axis", self.axis, "of the first axis", 3))
-        second = point("second", self.second, 3)
+        object.__setattr__(self, "axis", check_direction("axis", self.axis, "of the first axis", 3))
+        second = check_point("second", self.second, 3)
         across = np.subtract(second, np.dot(second, self.axis) * np.array(self.axis))
         if not np.linalg.norm(across) > PARALLEL * math.hypot(*second):
-            raise ValueError(f"second is {second}; give the direction of the second axis, not of the first")
+            raise ValueError(f"second is {second}; give the direction of the second axis, across the first")
         object.__setattr__(
-            self, "second", direction("second", across.tolist(), "of the second axis, not of the first", 3)
+            self, "second", check_direction("second", across.tolist(), "of the second axis, across the first", 3)
         )
 
     def _radii(self) -> list[tuple[str, float]]:
@@ -236,21 +236,21 @@ class Box(SpatialObstacle):
 
     @property
     def axes(self) -> np.ndarray:
-        """Its axes, ``(3, 3)``, one in each row."""
+        """Axes of the box, one in each row, ``(3, 3)``."""
         return np.array([self.axis, self.second, np.cross(self.axis, self.second)])
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """(center, three axes, half-sizes of the core, edge radius)."""
+        """Parameters (center, three axes, half-sizes of the core, edge radius) of the gap law."""
         return (*self.center, *self.axes.ravel().tolist(), *(size / 2 - self.edge for size in self.sizes), self.edge)
 
     @property
     def extent(self) -> Extent:
-        """The ball about its centre."""
+        """Ball about the centre of the box."""
         return Extent(self.center, math.hypot(*self.sizes) / 2, min(self.sizes) / 2, self.edge)
 
     def outline(self) -> np.ndarray:
-        """Points of its surface, ``(u, v, 3)`` [mm]."""
+        """Return points of the surface, ``(u, v, 3)`` [mm]."""
         x, y, z = np.array(self.sizes) / 2
         ring = np.array([[-x, -y], [x, -y], [x, y], [-x, y], [-x, -y]])
         walls = [(0.0, -z), (1.0, -z), (1.0, z), (0.0, z)]
@@ -260,16 +260,16 @@ class Box(SpatialObstacle):
 
 def _check_ends(start: Point, end: Point) -> None:
     if math.dist(start, end) < SMALLEST:
-        raise ValueError(f"start and end are both {start}; they must differ")
+        raise ValueError(f"start and end are both {start}; they must differ (a Sphere has one centre)")
 
 
 def _middle(start: Point, end: Point) -> tuple[Point, float]:
-    """Middle of a line, and half its length."""
+    """Return the middle of a line segment and half its length."""
     return tuple((np.add(start, end) / 2).tolist()), math.dist(start, end) / 2
 
 
 def _axes(axis: np.ndarray) -> np.ndarray:
-    """A unit vector and two that stand on it, ``(3, 3)``."""
+    """Return a unit vector and two more that are orthonormal to it, ``(3, 3)``."""
     helper = np.eye(3)[np.abs(axis).argmin()]
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
@@ -277,7 +277,7 @@ def _axes(axis: np.ndarray) -> np.ndarray:
 
 
 def _ball(axes: np.ndarray) -> np.ndarray:
-    """Unit vectors all around, ``(u, v, 3)``, from one end of the first axis to the other."""
+    """Return a grid of unit vectors, from one end of the first axis to the other, ``(u, v, 3)``."""
     down, turns = np.meshgrid(np.linspace(0, math.pi, 18), np.linspace(0, 2 * math.pi, 33), indexing="ij")
     parts = np.stack([np.cos(down), np.sin(down) * np.cos(turns), np.sin(down) * np.sin(turns)], axis=-1)
     return np.asarray(parts @ axes)

@@ -1,28 +1,26 @@
-"""The reference solver in space: eq. 13 in the node coordinates of the paper, through CasADi and IPOPT."""
+"""Reference solver in space: eq. 13 in the node coordinates of the paper, solved by IPOPT through CasADi."""
 
 import math
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from solver.common.checks import check_clear, check_core, check_scene
 from solver.common.geometry import touchable_points
-from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP
+from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP, nlp_solver
 from solver.common.layout import SPACE
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
-from solver.spatial.formulation import spatial_problem
+from solver.spatial.formulation import node_problem
 from solver.spatial.robot import SpatialRobot, sides
 from solver.spatial.solve import check_cables
 
 
 class SpatialReferenceSolver:
-    """Follows the same equilibria as :class:`solver.spatial.SpatialSolver`, by the problem as the paper writes it.
+    """Follows the equilibria of :class:`solver.spatial.SpatialSolver`, by solving the problem as the paper states it.
 
-    Only a branch is followed: where it ends, a step is ``GAVE_UP``. Tensions are reported and not
-    limited.
+    It only follows a branch: where the branch ends, a step is ``GAVE_UP``. Tensions are reported, but not limited.
 
     Args:
         robot: The robot.
@@ -37,16 +35,16 @@ class SpatialReferenceSolver:
         self.robot, self.scene = robot, scene
         check_core(robot, scene)
         self._touchable = touchable_points(robot, scene)
-        problem = spatial_problem(robot, scene.laws, scene.mounted)
+        problem = node_problem(robot, scene.laws, scene.mounted)
         self._equalities = problem.equalities.shape[0]
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
-        nlp: dict[str, Any] = {
+        nlp = {
             "x": problem.unknowns,
             "p": ca.vertcat(problem.parameters, unit := ca.MX.sym("unit")),
             "f": problem.objective / unit**2,
             "g": constraints,
         }
-        self._ipopt = ca.nlpsol("spatial_reference", "ipopt", nlp, OPTIONS)
+        self._ipopt = nlp_solver(nlp, OPTIONS)
         multipliers = ca.MX.sym("multipliers", constraints.shape[0])
         slopes = ca.gradient(problem.objective + ca.dot(multipliers, constraints), problem.parameters)[:2]
         self._cable_slopes = ca.Function("slopes", [problem.unknowns, problem.parameters, multipliers], [slopes])
@@ -54,15 +52,18 @@ class SpatialReferenceSolver:
         check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> SpatialEquilibrium:
-        """The straight, unactuated robot."""
+        """Return the straight, unactuated robot."""
         return self._rest
 
     def step(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> SpatialEquilibrium:
         """Move both pairs of cables evenly to displacements, along the branch.
 
         Args:
-            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
+            equilibrium: State to start from, of this solver or one of an equal robot and scene.
             cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm].
+
+        Returns:
+            The equilibrium reached: ``CONVERGED``, or ``GAVE_UP`` with the one given.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
@@ -81,7 +82,19 @@ class SpatialReferenceSolver:
                 return SpatialEquilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.GAVE_UP, 0)
         return now
 
+    def check_command(
+        self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
+    ) -> tuple[float, ...]:
+        """Return a command as floats, like :meth:`solver.spatial.SpatialSolver.check_command`.
+
+        Raises:
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is not one in space.
+        """
+        return tuple(check_cables(self.robot, self.scene, equilibrium, cables_mm).tolist())
+
     def _solve(self, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialEquilibrium | None:
+        """Return the solution for another command, ``None`` where IPOPT does not converge or leaves the branch."""
         free = self._free(cables)
         slack = SLACK * self.robot.offset_mm
         if np.abs(cables).max() < slack or (not start.contact.any() and free.gaps.min(initial=1.0) > 0):
@@ -98,32 +111,37 @@ class SpatialReferenceSolver:
             lbg=np.r_[zeros, np.where(bounded, 0.0, -np.inf)],
             ubg=np.r_[zeros, np.full(bounded.size, np.inf)],
         )
-        reached = solution["x"].full().ravel()
-        moved = np.linalg.norm((reached - unknowns).reshape(-1, 3), axis=1).max()
-        pulled = np.abs(cables - start.cables_mm).max() / self.robot.offset_mm
-        allowed = self.robot.longest_mm * (MOVE_OFFSET + MOVE_SLOPE * pulled)
-        stats = self._ipopt.stats()
-        if not (stats["success"] and moved <= allowed):
+        reached, stats = solution["x"].full().ravel(), self._ipopt.stats()
+        if not (stats["success"] and self._stayed(start, unknowns, cables, reached)):
             return None
         multipliers = solution["lam_g"].full().ravel()
-        held = -multipliers[self._equalities :]
-        held[held < np.abs(solution["g"].full().ravel()[self._equalities :])] = 0.0  # what the barrier left
+        pushing = -multipliers[self._equalities :]
+        pushing[pushing < np.abs(solution["g"].full().ravel()[self._equalities :])] = 0.0  # left by the barrier
         slopes = unit**2 * self._cable_slopes(reached, parameters, multipliers).full().ravel()
         tensions = sides(cables) * slopes * self.robot.energy_scale
+        nodes, frames = self._shape(cables, reached)
+        mounts = reached[9 * self.robot.segments :]
+        return self._equilibrium(cables, tensions, nodes, frames, unit**2 * pushing, mounts, int(stats["iter_count"]))
+
+    def _stayed(self, start: SpatialEquilibrium, unknowns: np.ndarray, cables: np.ndarray, reached: np.ndarray) -> bool:
+        """Return whether no node moved so far that the solution left the branch."""
+        moved = np.linalg.norm((reached - unknowns).reshape(-1, 3), axis=1).max()
+        pulled = np.abs(cables - start.cables_mm).max() / self.robot.offset_mm
+        return bool(moved <= self.robot.longest_mm * (MOVE_OFFSET + MOVE_SLOPE * pulled))
+
+    def _shape(self, cables: np.ndarray, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return nodes ``(n+1, 3)`` and frames ``(n+1, 3, 3)`` of a solution."""
         n = self.robot.segments
-        nodes, first, second = (np.vstack([np.zeros(3), part]) for part in reached[: 9 * n].reshape(3, n, 3))
+        nodes, first, second = (np.vstack([np.zeros(3), part]) for part in unknowns[: 9 * n].reshape(3, n, 3))
         disks = np.stack([first[1:] - nodes[1:], second[1:] - nodes[1:]], axis=1)  # (n, 2, 3)
+        holes = (sides(cables)[:, None] * self.robot.holes)[:, :2]
         frames = np.tile(np.eye(3), (n + 1, 1, 1))
-        frames[1:, :, :2] = np.swapaxes(
-            np.linalg.solve((sides(cables)[:, None] * self.robot.holes)[:, :2], disks), 1, 2
-        )
+        frames[1:, :, :2] = np.swapaxes(np.linalg.solve(holes, disks), 1, 2)
         frames[1:, :, 2] = np.cross(frames[1:, :, 0], frames[1:, :, 1])
-        return self._equilibrium(
-            cables, tensions, nodes, frames, unit**2 * held, reached[9 * n :], int(stats["iter_count"])
-        )
+        return nodes, frames
 
     def _free(self, cables: np.ndarray) -> SpatialEquilibrium:
-        """The robot that nothing touches: every segment turns alike, towards b with ``h·b = pull`` for both holes h."""
+        """Return the free robot: every segment turns alike, towards b with ``h·b = pull`` for both holes h."""
         n, length, holes = self.robot.segments, self.robot.segment_mm, self.robot.holes
         towards = np.append(np.linalg.solve(holes[:, :2], cables / n), 0.0)  # 2 sin θ/2 along the bend
         size = float(np.linalg.norm(towards))
@@ -152,37 +170,37 @@ class SpatialReferenceSolver:
         mounts: np.ndarray | None,
         iterations: int,
     ) -> SpatialEquilibrium:
-        """An equilibrium with what belongs to its shape; its onset and free slopes are not told."""
-        places = spatial_layout(self.robot, len(self.scene))
-        block = np.zeros(places.size)
-        places.cables(block)[:] = cables
-        places.length(block)[:] = self.robot.length_mm
-        places.tensions(block)[:] = tensions
-        places.coordinates(block)[:] = _controls(nodes, frames)
-        places.nodes(block)[:], places.frames(block)[:] = nodes, frames
+        """Return an equilibrium with all that follows from its shape; onset tensions and tip slopes stay zero."""
+        fields = spatial_layout(self.robot, len(self.scene))
+        block = np.zeros(fields.size)
+        fields.cables(block)[:] = cables
+        fields.length(block)[:] = self.robot.length_mm
+        fields.tensions(block)[:] = tensions
+        fields.coordinates(block)[:] = _controls(nodes, frames)
+        fields.nodes(block)[:], fields.frames(block)[:] = nodes, frames
         if multipliers is not None and mounts is not None:
-            places.multipliers(block)[:, :, 1:] = multipliers.reshape(self._touchable[:, :, 1:].shape)
-            places.displacements(block)[list(self.scene.mounted)] = mounts.reshape(-1, 3)
+            fields.multipliers(block)[:, :, 1:] = multipliers.reshape(self._touchable[:, :, 1:].shape)
+            fields.displacements(block)[list(self.scene.mounted)] = mounts.reshape(-1, 3)
         points = touching_points(self.robot, nodes, frames)
-        for j, (obstacle, moved) in enumerate(zip(self.scene, places.displacements(block), strict=True)):
-            places.gaps(block)[j] = np.where(self._touchable[j], obstacle.gap(points - moved), np.inf)
-            pushed = places.multipliers(block)[j, ..., None] * obstacle.normal_at(points - moved)
-            places.forces(block)[j] = self.robot.energy_scale * pushed.sum(axis=(0, 1))
-        places.force(block)[:] = places.forces(block).sum(axis=0)
-        places.clearance(block)[:] = places.gaps(block).min(initial=np.inf)
-        places.flags(block)[:] = (places.multipliers(block) > 0).any(axis=0).ravel()
+        for j, (obstacle, moved) in enumerate(zip(self.scene, fields.displacements(block), strict=True)):
+            fields.gaps(block)[j] = np.where(self._touchable[j], obstacle.gap(points - moved), np.inf)
+            pushed = fields.multipliers(block)[j, ..., None] * obstacle.normal_at(points - moved)
+            fields.forces(block)[j] = self.robot.energy_scale * pushed.sum(axis=(0, 1))
+        fields.force(block)[:] = fields.forces(block).sum(axis=0)
+        fields.clearance(block)[:] = fields.gaps(block).min(initial=np.inf)
+        fields.flags(block)[:] = (fields.multipliers(block) > 0).any(axis=0).ravel()
         angles = [_angles(frames @ hole / self.robot.offset_mm) for hole in self.robot.holes]
-        places.objective(block)[:] = np.sum(np.square(angles))
+        fields.objective(block)[:] = np.sum(np.square(angles))
         return SpatialEquilibrium(self.robot, self.scene, block, Status.CONVERGED, iterations)
 
 
 def _angles(directions: np.ndarray) -> np.ndarray:
-    """Angles between consecutive unit vectors, ``(n,)``."""
+    """Return the angles between consecutive unit vectors, ``(n,)``."""
     return np.asarray(2 * np.arcsin(np.linalg.norm(np.diff(directions, axis=0), axis=1) / 2))
 
 
 def _controls(nodes: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Shears and twists of the segments of a shape, ``(n, 3)``."""
+    """Return the shears and twists of the segments of a shape, ``(n, 3)``."""
     turns = np.swapaxes(frames[:-1], 1, 2) @ frames[1:]
     cosines = np.sqrt(1 + np.trace(turns, axis1=1, axis2=2)) / 2  # of half the angle
     twisted = turns - np.swapaxes(turns, 1, 2)

@@ -1,43 +1,37 @@
-"""How an equilibrium in space changes with its cables, its length and its obstacles.
+"""Derivatives of an equilibrium in space in the cable displacements, the robot's length and its obstacles.
 
-The method is that of :mod:`solver.planar.sensitivity`.
+They follow from the implicit function theorem at the active set of eq. 13, as in the plane.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import ClassVar
 
-import casadi as ca
 import numpy as np
 
-from solver.common.gap_laws import GapLaw
 from solver.common.implicit import respond
-from solver.common.node_problem import second_derivatives
 from solver.common.scene import MAX_OBSTACLES
-from solver.common.validation import instance, whole
+from solver.common.validation import check_instance, check_whole
 from solver.spatial.equilibrium import SpatialEquilibrium
-from solver.spatial.formulation import spatial_problem
-from solver.spatial.robot import SpatialRobot, sides
-
-MOTIONS = 7  # of an obstacle
+from solver.spatial.formulation import MOTIONS, kkt_derivatives
+from solver.spatial.robot import sides
 
 
 @dataclass(frozen=True, slots=True)
 class SpatialSensitivity:
-    """Derivatives of an equilibrium, the parameters along the first axis.
+    """Derivatives of an equilibrium, with the parameters along the first axis.
 
-    The parameters are the displacements of both pairs of cables [mm], the length of the backbone [mm], then of every
+    The parameters are the displacements of both pairs of cables [mm], the length of the backbone [mm], then for every
     obstacle its shift in x, y and z [mm], its turns about the axes x, y and z through its centre [rad] and the growth
     of its radius [mm]; q = 3 + 7m in all. Where a contact is about to open or close, or a displacement is zero, the
-    derivatives are those of the side on which the active set and the pulled cables stay as they are.
+    derivatives are one-sided: those for an unchanged active set and the same pulled cables.
 
     Attributes:
-        nodes: Of the backbone points, ``(q, n+1, 3)``.
-        turns: Of the disks, as turns about the axes of the base frame, ``(q, n+1, 3)`` [rad per unit].
-        multipliers: Of the multipliers, ``(q, m, p, k)`` [rad²/mm per unit]; zero where nothing touches.
-        tensions: Of the tensions, ``(q, 2)`` [N per unit].
-        forces: Of the force of each obstacle on the robot, ``(q, m, 3)`` [N per unit].
-        displacements: Of how far each obstacle has been pushed, ``(q, m, 3)`` [mm per unit].
+        nodes: Slopes of the backbone points, ``(q, n+1, 3)``.
+        turns: Rotations of the disks, as turns about the axes of the base frame, ``(q, n+1, 3)`` [rad per unit].
+        multipliers: Slopes of the multipliers, ``(q, m, p, k)`` [rad²/mm per unit]; zero where nothing touches.
+        tensions: Slopes of the cable tensions, ``(q, 2)`` [N per unit].
+        forces: Slopes of the force of each obstacle on the robot, ``(q, m, 3)`` [N per unit].
+        displacements: Slopes of the displacement of each obstacle on a spring, ``(q, m, 3)`` [mm per unit].
     """
 
     CABLES: ClassVar[slice] = slice(0, 2)
@@ -52,12 +46,12 @@ class SpatialSensitivity:
 
     @staticmethod
     def obstacle_rows(obstacle: int) -> slice:
-        """Return the rows that belong to an obstacle: three shifts, three turns, radius.
+        """Return the rows of an obstacle: three shifts, three turns, radius.
 
         Raises:
             ValueError: If it is not the index of an obstacle.
         """
-        obstacle = whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
+        obstacle = check_whole("obstacle", obstacle, 0, MAX_OBSTACLES - 1)
         return slice(3 + MOTIONS * obstacle, 3 + MOTIONS * (obstacle + 1))
 
 
@@ -65,25 +59,22 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
     """Differentiate an equilibrium with respect to every parameter.
 
     Args:
-        equilibrium: A stable equilibrium, some cable of it pulled, as a slack robot's shear is not determined.
+        equilibrium: A stable equilibrium with a pulled cable, as the shear of a slack robot is undetermined.
         active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier.
 
     Raises:
         ValueError: If no cable is pulled, or ``active`` has the wrong shape, or contacts that cannot all be closed at
             once.
-        TypeError: If ``equilibrium`` is something else.
+        TypeError: If ``equilibrium`` is not one in space.
     """
-    instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
+    check_instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
     robot, scene = equilibrium.robot, equilibrium.scene
     if not equilibrium.cables_mm.any():
         raise ValueError("cables_mm is (0, 0); one must be pulled, for the shear to be determined")
-    change = respond(equilibrium, _kkt_derivatives(robot, scene.laws, scene.mounted), active, [])
+    change = respond(equilibrium, kkt_derivatives(robot, scene.laws, scene.mounted), active, [])
     loads = change.loads
     loads[SpatialSensitivity.LENGTH] -= change.load / equilibrium.length_mm  # of the energy scale, EI·n / 2 L0
-    for slopes in (change.unknowns, change.multipliers, loads):
-        for j, obstacle in enumerate(scene):
-            shifts, turns = np.split(slopes[SpatialSensitivity.obstacle_rows(j)][:6], 2)
-            turns += np.tensordot(-np.cross(np.eye(3), obstacle.extent.center), shifts, axes=1)
+    _turn_about_centres(equilibrium, change.unknowns, change.multipliers, loads)
     forces = loads[:, 3:].reshape(len(loads), len(scene), MOTIONS)[:, :, :3]
     displacements = np.zeros_like(forces)
     lines, mounts = np.split(change.unknowns, [9 * robot.segments], axis=1)
@@ -101,17 +92,18 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
     )
 
 
+def _turn_about_centres(equilibrium: SpatialEquilibrium, *slopes: np.ndarray) -> None:
+    """Convert turns about the origin to turns about each obstacle's centre, in place: they differ by a shift."""
+    for rows in slopes:
+        for j, obstacle in enumerate(equilibrium.scene):
+            shifts, turns = np.split(rows[SpatialSensitivity.obstacle_rows(j)][:6], 2)
+            turns += np.tensordot(-np.cross(np.eye(3), obstacle.extent.center), shifts, axes=1)
+
+
 def _turns(equilibrium: SpatialEquilibrium, disks: np.ndarray, pulled: np.ndarray) -> np.ndarray:
-    """Turns of the disks from the motion of their holes, ``(q, n+1, 3)``: half the sum of e × δe over their axes."""
+    """Return the turns of the disks from the motion of their holes, ``(q, n+1, 3)``: half the sum of e × δe."""
     holes = pulled[:, None] * equilibrium.robot.holes[:, :2]
     first, second = np.tensordot(np.linalg.inv(holes), disks, axes=1)
     x, y, z = np.moveaxis(equilibrium.frames, 2, 0)
     third = np.cross(first, y) + np.cross(x, second)
     return np.asarray((np.cross(x, first) + np.cross(y, second) + np.cross(z, third)) / 2)
-
-
-@lru_cache(maxsize=32)
-def _kkt_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
-    """:func:`~solver.common.node_problem.second_derivatives` of :func:`spatial_problem`."""
-    change = ca.MX.sym("change", 3 + MOTIONS * len(laws))
-    return second_derivatives(spatial_problem(robot, laws, mounted, change), change)

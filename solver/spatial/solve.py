@@ -1,20 +1,16 @@
-"""The solver in space: one robot in one scene, or many side by side."""
-
-from typing import ClassVar
+"""Solver in space: follows the equilibria of one robot in one scene step by step."""
 
 import numpy as np
 
 from solver import _kernel
-from solver.common.batch import BaseBatch
 from solver.common.checks import check_clear, check_core, check_origin, check_scene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
-from solver.common.layout import SPACE, Layout, Model
+from solver.common.layout import SPACE
 from solver.common.scene import Scene
-from solver.common.status import Status
 from solver.common.trace import Trace, read_trace
-from solver.common.validation import number, sequence, shown
-from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
+from solver.common.validation import check_number, check_sequence, refusal
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout
 from solver.spatial.robot import SpatialRobot
 
 
@@ -29,9 +25,9 @@ class SpatialSolver:
         scene: The obstacles, of :mod:`solver.spatial`.
 
     Raises:
-        ValueError: If an obstacle is one of the plane, overlaps the straight robot, is narrow enough to slip between
-            its points, names a node the robot does not have, or is out of all proportion to it.
-        TypeError: If the robot or the scene is something else.
+        ValueError: If an obstacle is one of the plane, overlaps the straight robot, is small enough to slip between
+            its points, names a node the robot does not have, or is out of proportion to the robot.
+        TypeError: If the robot or the scene is of the wrong class.
     """
 
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
@@ -45,32 +41,32 @@ class SpatialSolver:
         check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> SpatialEquilibrium:
-        """The straight, unactuated robot."""
+        """Return the straight, unactuated robot."""
         return self._rest
 
     def step(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> SpatialEquilibrium:
-        """Move both pairs of cables evenly to displacements, as far as tension and obstacles allow.
+        """Move both pairs of cables to displacements, at proportional rates, as far as tension and obstacles allow.
 
-        A cable whose tension reaches the limit stops there, and the other goes on by itself.
+        A cable whose tension reaches the limit stops there, and the other goes on alone.
 
         Args:
-            equilibrium: Where the robot is, from this solver or one of an equal robot and scene.
-            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign tells which of its
-                cables is pulled.
+            equilibrium: State to start from, of this solver or one of an equal robot and scene.
+            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign selects the
+                cable of the pair that is pulled.
 
         Returns:
-            The equilibrium reached; its ``status`` says how. While anything touches, the cables are not slackened
+            The equilibrium reached; its ``status`` tells how. While anything touches, the cables are not slackened
             together below a pretension of a/160, where the shape would be undetermined.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is something else.
+            TypeError: If ``equilibrium`` is not one in space.
         """
         cables = check_cables(self.robot, self.scene, equilibrium, cables_mm)
         return self._follow(equilibrium.block, cables)
 
     def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> Trace:
-        """Every shape accepted on the way of :meth:`step`, from the present one on.
+        """Return every shape accepted on the way of :meth:`step`, beginning with the present one.
 
         Raises:
             ValueError: As :meth:`step`.
@@ -80,7 +76,7 @@ class SpatialSolver:
         return read_trace(shapes, self.robot, self.scene, 3)
 
     def optimality(self, equilibrium: SpatialEquilibrium) -> Optimality:
-        """How well an equilibrium meets its conditions, computed anew by the kernel.
+        """Return the optimality residuals of an equilibrium, recomputed by the kernel.
 
         Raises:
             ValueError: If the equilibrium is another robot's or scene's.
@@ -95,7 +91,7 @@ class SpatialSolver:
 
         Raises:
             ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is something else.
+            TypeError: If ``equilibrium`` is not one in space.
         """
         return tuple(check_cables(self.robot, self.scene, equilibrium, cables_mm).tolist())
 
@@ -104,30 +100,6 @@ class SpatialSolver:
         first, second = cables.tolist()
         work = self._kernel.step(block, first, second, self.robot.length_mm, reached)
         return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
-
-
-class SpatialBatchSolver(BaseBatch):
-    """Many robots in space, each moved as :class:`SpatialSolver` would; see :class:`solver.common.batch.BaseBatch`."""
-
-    model: ClassVar[Model] = SPACE
-    robot_kind: ClassVar[type] = SpatialRobot
-
-    def _straight_points(self) -> np.ndarray:
-        nodes = np.zeros((self.robot.segments + 1, 3))
-        nodes[:, 2] = np.linspace(0.0, self.robot.length_mm, len(nodes))
-        return touching_points(self.robot, nodes, np.tile(np.eye(3), (len(nodes), 1, 1)))
-
-    def _make_layout(self, obstacles: int) -> Layout:
-        return spatial_layout(self.robot, obstacles)
-
-    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialBatch:
-        return _kernel.SpatialBatch(kernel_robot(self.robot), self.count, obstacles, threads)
-
-    def _kernel_obstacles(self, scene: Scene) -> list[_kernel.SpatialObstacle]:
-        return kernel_scene(self.robot, scene)
-
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> SpatialEquilibrium:
-        return SpatialEquilibrium(self.robot, scene, block, status, *work)
 
 
 def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
@@ -160,19 +132,19 @@ def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObsta
 def check_cables(
     robot: SpatialRobot, scene: Scene, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
 ) -> np.ndarray:
-    """Refuse a command out of range and an equilibrium of another robot or scene; returns the command, ``(2,)``.
+    """Return a command as an array ``(2,)``, after checking it and the equilibrium it starts from.
 
     Raises:
-        ValueError: Naming the value and the bound.
-        TypeError: If the equilibrium is something else.
+        ValueError: If a command is out of range, or the equilibrium is another robot's or scene's.
+        TypeError: If the equilibrium is not one in space.
     """
     limit = robot.cable_limit_mm
     bound = f"a pair, both within ±{limit:.6g} (robot.max_cable_mm)"
     cables = [
-        number("an entry of cables_mm", cable, -limit, limit, bound)
-        for cable in sequence("cables_mm", cables_mm, bound)
+        check_number("an entry of cables_mm", cable, -limit, limit, bound)
+        for cable in check_sequence("cables_mm", cables_mm, bound)
     ]
     if len(cables) != 2:
-        raise ValueError(f"cables_mm is {shown(cables_mm)}; it must be {bound}")
+        raise refusal("cables_mm", cables_mm, bound)
     check_origin(robot, scene, equilibrium, SpatialEquilibrium)
     return np.array(cables)

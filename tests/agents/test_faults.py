@@ -1,4 +1,4 @@
-"""What goes wrong outside a command ends in one line and an exit code, and nothing is lost or left half-written."""
+"""Errors outside a command end in one line and an exit code, and nothing is lost or left half-written."""
 
 import errno
 import os
@@ -8,16 +8,18 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from agents import checkpoint, cli, commands, training
-from agents.actor import ACTOR, LearnedPolicy
+from agents import cli, commands
 from agents.config import TrainConfig
 from agents.errors import UserError
 from agents.files import LOCK, PARTIAL, locked, replacing, write_text
+from agents.learning import checkpoint, training
+from agents.learning.actor import ACTOR, LearnedPolicy
 from agents.tuned import PPOSettings
-from agents.workers import workers
+from agents.workers import worker_pool
 
 SMALL = [
     "ppo",
@@ -44,13 +46,13 @@ def started(*arguments, **options):
 
 
 def ended(process, timeout=60):
-    """Exit code and lines of the error stream."""
+    """Return the exit code and the lines of the error stream."""
     _, err = process.communicate(timeout=timeout)
     return process.returncode, err.splitlines()
 
 
 def called(monkeypatch, capsys, *arguments):
-    """The same in this process."""
+    """Return the same for a command in this process."""
     monkeypatch.setattr(sys, "argv", ["ccr-gym", *map(str, arguments)])
     with pytest.raises(SystemExit) as caught:
         cli.main()
@@ -58,7 +60,7 @@ def called(monkeypatch, capsys, *arguments):
 
 
 def assert_one_line(code, lines, *words):
-    assert code == cli.WRONG
+    assert code == cli.FAILED
     assert len(lines) == 1, lines
     assert all(word in lines[0] for word in ("ccr-gym: ", *words)), lines
 
@@ -67,9 +69,9 @@ def assert_one_line(code, lines, *words):
     ("arguments", "words"),
     [
         (("evaluate", "--runs", "nowhere"), "nowhere/actor.safetensors is missing; train first"),
-        (("evaluate", "--pretrained", "."), "there are no trained policies"),
-        (("evaluate", "--pretrained", "nowhere"), "there are no trained policies"),
-        (("evaluate", "--policies", "PPO", "--pretrained", "nowhere"), "there are no trained policies"),
+        (("evaluate", "--pretrained", "."), "no trained policy found"),
+        (("evaluate", "--pretrained", "nowhere"), "no trained policy found"),
+        (("evaluate", "--policies", "PPO", "--pretrained", "nowhere"), "no trained policy found"),
         (("evaluate", "--out", "file", "--policies", "PI"), "file"),
         (("train", "--run", "file"), "file"),
         (("train", "--run", "."), "holds file but no config.json"),
@@ -98,17 +100,16 @@ def test_a_damaged_study_is_named(tmp_path, monkeypatch, capsys):
     assert_one_line(*called(monkeypatch, capsys, "sweep", "--out", tmp_path, "--trials", 1), str(study))
 
 
-@pytest.mark.parametrize("command", sorted(commands.COMMANDS, key=str))
-def test_a_bug_shows_where_it_is_and_an_interrupt_does_not(command, monkeypatch, capsys):
+@pytest.mark.parametrize("name", ["train", "evaluate", "retrain", "sweep", "bench", "reproduce"])
+def test_a_bug_shows_where_it_is_and_an_interrupt_does_not(name, monkeypatch, capsys):
     def fail(error):
         raise error
 
-    name = commands.COMMANDS[command].__name__
     monkeypatch.setattr(sys, "argv", ["ccr-gym", name])
-    monkeypatch.setitem(commands.COMMANDS, command, lambda _: fail(ValueError("a bug")))
+    monkeypatch.setattr(commands, name, lambda _: fail(ValueError("a bug")))
     with pytest.raises(ValueError, match="a bug"):
         cli.main()
-    monkeypatch.setitem(commands.COMMANDS, command, lambda _: fail(KeyboardInterrupt()))
+    monkeypatch.setattr(commands, name, lambda _: fail(KeyboardInterrupt()))
     code, lines = called(monkeypatch, capsys, name)
     assert (code, len(lines)) == (cli.INTERRUPTED, 1)
 
@@ -116,7 +117,7 @@ def test_a_bug_shows_where_it_is_and_an_interrupt_does_not(command, monkeypatch,
 @pytest.mark.parametrize("name", ["train", "evaluate", "retrain"])
 @pytest.mark.parametrize("seconds", [0.2, 6.0], ids=["loading", "working"])
 def test_an_interrupt_ends_a_command_in_one_line_and_leaves_no_process(name, seconds, tmp_path):
-    """As a terminal does it: the signal goes to all processes of the command."""
+    """As in a terminal, all processes of the command get the signal."""
     process = started(name, "--run" if name == "train" else "--out", tmp_path / "out", start_new_session=True)
     time.sleep(seconds)
     os.killpg(process.pid, signal.SIGINT)
@@ -125,8 +126,22 @@ def test_an_interrupt_ends_a_command_in_one_line_and_leaves_no_process(name, sec
     assert not list(tmp_path.rglob(f"{PARTIAL}*"))
 
 
+@pytest.mark.parametrize("package", ["agents", "solver"])
+def test_another_projects_package_is_named(package, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, package, SimpleNamespace(__file__="site-packages/theirs.py", __all__=["Agent"]))
+    assert_one_line(*called(monkeypatch, capsys, "bench"), repr(package), "site-packages/theirs.py", "pip install")
+
+
+def test_help_loads_no_learning_library():
+    code = "import sys; from agents.cli import main; sys.argv = ['ccr-gym', '--help']\n"
+    code += "try:\n    main()\nfinally:\n    print(*sys.modules, file=sys.stderr)"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "usage: ccr-gym" in ran.stdout
+    assert not {"torch", "stable_baselines3", "matplotlib", "scipy"} & set(ran.stderr.split())
+
+
 def limited(size):
-    """What makes a disk fill for a process: no file may grow beyond some bytes."""
+    """Return a function that limits the size of files, as if the disk were full."""
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
@@ -178,7 +193,7 @@ def test_a_run_that_is_killed_goes_on_from_its_checkpoint(tmp_path):
     process.kill()
     process.communicate()
     config = TrainConfig.load(run / training.CONFIG)
-    kept = checkpoint.Run(config).progress
+    kept = checkpoint.TrainingRun(config).progress
     assert kept.steps > 0
     assert not (run / ACTOR).exists()
     policy = LearnedPolicy(training.train(config, progress=False))
@@ -210,10 +225,10 @@ def test_a_finished_run_says_so_and_ends_well(tmp_path, monkeypatch, capsys):
     ]
     monkeypatch.setattr(sys, "argv", ["ccr-gym", "train", "--run", str(run), "ppo", *arguments])
     cli.main()
-    assert "is finished already; --restart trains it anew" in capsys.readouterr().out
+    assert "is already finished; --restart trains it again" in capsys.readouterr().out
     assert (run / ACTOR).stat().st_mtime_ns == before
 
 
-def test_a_worker_that_dies_is_told_of():
-    with pytest.raises(UserError, match="a worker process was killed"), workers(1) as pool:
+def test_a_worker_that_dies_is_reported():
+    with pytest.raises(UserError, match="a worker process was killed"), worker_pool(1) as pool:
         pool.submit(os._exit, 1).result()

@@ -1,4 +1,4 @@
-"""Invariants that every registered environment keeps."""
+"""Invariants of every registered environment."""
 
 import json
 
@@ -10,8 +10,7 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import ccr_gym
 from agents.policy import search
-from ccr_gym.environments import PushObstacleEnv
-from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym import FORCE_SCALE_N, PushObstacleEnv
 from solver import Circle, Scene, Status
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
@@ -23,7 +22,7 @@ def make(env_id: str, **kwargs):
 
 
 def play(env, actions):
-    """Everything an episode returns, in one flat list of arrays."""
+    """Return everything an episode returns, as a flat list of arrays."""
     observation, info = env.reset(seed=3)
     record = [observation, info["force_true"], info["force_est"]]
     for action in actions:
@@ -37,7 +36,7 @@ def play(env, actions):
 
 @EVERY_ID
 @EVERY_MODE
-def test_checkers_pass_without_a_warning(env_id, obs_mode):
+def test_environment_checkers_pass_without_warnings(env_id, obs_mode):
     env = gymnasium.make(env_id, obs_mode=obs_mode, render_mode="rgb_array")
     check_env(env.unwrapped)
     sb3_check_env(env)
@@ -58,14 +57,14 @@ def test_renders_to_an_array_and_to_a_window(env_id, monkeypatch):
 
 
 @EVERY_ID
-def test_same_seed_same_bits(env_id):
+def test_equal_seeds_give_identical_bits(env_id):
     actions = np.random.default_rng(0).uniform(-0.5, 1, (64, *make(env_id).action_space.shape)).astype(np.float32)
     first, second = (play(make(env_id, obs_mode="flat"), actions) for _ in range(2))
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
 
 @EVERY_ID
-def test_flat_is_the_dict_in_order(env_id):
+def test_flat_observation_concatenates_the_dict(env_id):
     flat, _ = make(env_id, obs_mode="flat").reset(seed=5)
     entries, _ = make(env_id, obs_mode="dict").reset(seed=5)
     assert np.array_equal(flat, np.concatenate(list(entries.values())))
@@ -147,7 +146,7 @@ def test_bad_arguments_are_refused(kwargs, message):
         PushObstacleEnv(**kwargs)
 
 
-def test_a_fixed_assignment_is_taken_as_given():
+def test_given_scene_and_set_point_are_used():
     env = make("CCR/PushObstacle-v0")
     scene = Scene([Circle(center=(44, 104), radius=15)])
     observation, info = env.reset(options={"scene": scene, "desired_force": 0.05})
@@ -176,13 +175,13 @@ def test_arguments_are_json_able():
     assert 12 <= env.unwrapped.equilibrium.scene.obstacles[0].radius <= 13
 
 
-def test_an_impossible_task_says_so():
+def test_an_infeasible_task_names_the_remedy():
     env = make("CCR/LoadCell-v0", task={"force_n": [0.1, 0.2], "distance_mm": [170.0, 179.0]})
     with pytest.raises(RuntimeError, match="widen"):
         env.reset(seed=0)
 
 
-def test_without_the_force_sensor_only_the_estimate_is_seen():
+def test_without_force_sensor_only_the_estimate_is_observed():
     env = make("CCR/PushObstacle-v0", force_sensor=False)
     observation, _ = env.reset(seed=0)
     assert "force_est" in observation

@@ -1,4 +1,4 @@
-"""Anything given to any public entry of an environment works, or is refused by name and leaves all as it was."""
+"""Whatever is passed to an environment works, or is refused by name and changes nothing."""
 
 from dataclasses import fields
 
@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as nps
 
 import ccr_gym
-import ccr_gym.tasks
+import ccr_gym.sampling
 from ccr_gym import RewardWeights, Sensing
 from solver import Circle, HalfPlane, Scene
 from solver.spatial import Sphere
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
-EVERY_FORM = pytest.mark.parametrize("count", [None, 3])  # of environments; one of them on its own
+EVERY_FORM = pytest.mark.parametrize("count", [None, 3])  # number of environments; None for a single one
 fuzz = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-DRAWS = 20
+SAMPLES = 20
 SLIPS = "could slip between points"
 OPTIONS = ("seed", "options", "scene", "desired_force", "reset_mask", "overlaps the straight robot", SLIPS)
 UNREACHABLE = "widen the task's ranges"
@@ -48,7 +48,7 @@ anything = numbers | odd | pairs | ascending | st.lists(pairs, min_size=3, max_s
 
 
 def build(env_id, count, /, **kwargs):
-    if "render_mode" in kwargs and count is None:  # in other words than Gymnasium refuses it
+    if "render_mode" in kwargs and count is None:  # Gymnasium refuses it with a message of its own
         return load_env_creator(gymnasium.spec(env_id).entry_point)(**kwargs)
     if count is None:
         return gymnasium.make(env_id, disable_env_checker=True, **kwargs).unwrapped
@@ -57,7 +57,7 @@ def build(env_id, count, /, **kwargs):
 
 
 def named(error, *words):
-    """One of some words stands in a message."""
+    """Assert that a message contains one of some words."""
     assert any(word in str(error) for word in words), error
 
 
@@ -68,7 +68,7 @@ def check_step(env, step):
 
 
 def arguments(env_id, count):
-    """Names of all arguments of an environment, in lists of those that share a mapping."""
+    """Return the paths of all arguments of an environment: names, and names within mappings."""
     env = build(env_id, None)
     names = [field.name for field in fields(env.settings)] + ["task", "render_mode"]
     if count is not None:
@@ -81,7 +81,7 @@ def arguments(env_id, count):
 
 
 def given_as(env_id, name, value):
-    """Keyword arguments with a value in the place of a name; a robot has no defaults, so it keeps its other fields."""
+    """Return keyword arguments with a value at a path; a robot has no defaults, so it keeps its other fields."""
     if len(name) == 1:
         return {name[0]: value}
     robot = build(env_id, None).settings.robot
@@ -90,7 +90,7 @@ def given_as(env_id, name, value):
 
 
 def words(name, kwargs):
-    """What a refusal may name: the argument, or what it fits ill with of the same robot."""
+    """Return what a message may name: the argument, or another field of the same robot."""
     if name[0] == "robot" and len(name) == 2:
         return tuple(kwargs["robot"])
     return ("num_envs" if name == ("count",) else name[0], *name[1:])
@@ -99,7 +99,7 @@ def words(name, kwargs):
 @EVERY_FORM
 @EVERY_ID
 def test_arguments(env_id, count, monkeypatch):
-    monkeypatch.setattr(ccr_gym.tasks, "MAX_DRAWS", DRAWS)
+    monkeypatch.setattr(ccr_gym.sampling, "MAX_SAMPLES", SAMPLES)
 
     @settings(fuzz, max_examples=150)
     @given(st.sampled_from(arguments(env_id, count)), anything)
@@ -131,10 +131,10 @@ def scenes(space):
 
 
 def operations(env_id, count):
-    """Resets and steps, most of them with something odd."""
+    """Return resets and steps, most of them with odd arguments."""
     env = build(env_id, count)
     shape = env.action_space.shape
-    single = scenes(env.task.body.model.space) | scenes(2) | odd
+    single = scenes(env.task.adapter.space) | scenes(2) | odd
     given_scene = st.fixed_dictionaries({}, optional={"scene": single, "desired_force": numbers | odd, "seen": odd})
     mask = st.fixed_dictionaries({}, optional={"reset_mask": nps.arrays("?", st.integers(0, 4)) | odd, "a": odd})
     seeds = st.integers(0, 9) | numbers | odd | st.lists(st.integers(0, 9) | st.none() | numbers, max_size=4)

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
-from ccr_gym.rendering import LAYOUT, PALETTE, Camera, Frame, Renderer, arrow_of
+from ccr_gym.rendering import Frame, Renderer
+from ccr_gym.rendering.camera import Camera
+from ccr_gym.rendering.palette import LAYOUT, PALETTE
+from ccr_gym.rendering.planar import reaction_arrow
 from solver import Circle, Equilibrium, HalfPlane, Obstacle, Robot, Scene, Solver
 
 SIZE = (640, 640)
@@ -78,7 +81,7 @@ def test_pictures_are_separate_arrays(renderer: Renderer, free: Equilibrium, tou
     np.testing.assert_array_equal(first, kept)
 
 
-def test_circle_is_where_it_should_be(renderer: Renderer, free: Equilibrium) -> None:
+def test_circle_is_drawn_at_its_position(renderer: Renderer, free: Equilibrium) -> None:
     picture = renderer.draw(frame_of(free))
     (x, y), radius = FREE.center, FREE.radius
     for across, up in ((0, 0), (0.8, 0), (-0.8, 0), (0, 0.8), (0, -0.8)):
@@ -140,7 +143,7 @@ def test_arrow_is_the_reaction_on_the_obstacle(renderer: Renderer, touching: Equ
 )
 def test_arrow_length_follows_the_scale_and_is_limited(force: float, length: float) -> None:
     camera = Camera.fit(500, 500)
-    vector = arrow_of(camera, np.array([0.0, force]), 0.2)
+    vector = reaction_arrow(camera, np.array([0.0, force]), 0.2)
     np.testing.assert_allclose(vector, [0, length * LAYOUT.arrow_mm * camera.scale], atol=1e-12)
 
 
@@ -165,7 +168,7 @@ def test_gauge_bars_follow_the_forces(renderer: Renderer, free: Equilibrium) -> 
     assert bars(0.1) == [pytest.approx(0.5 * full, rel=0.1), pytest.approx(0.4 * full, rel=0.1)]
 
 
-def test_force_that_is_not_finite_is_drawn_without_complaint(renderer: Renderer, touching: Equilibrium) -> None:
+def test_non_finite_forces_are_not_drawn(renderer: Renderer, touching: Equilibrium) -> None:
     frame = frame_of(touching, (-0.05, 0.05))
     for value in (np.nan, np.inf):
         renderer.draw(replace(frame, force_est=np.array([value, 0.0])))
@@ -189,7 +192,7 @@ def test_window_shows_the_picture(monkeypatch: pytest.MonkeyPatch, free: Equilib
     renderer.close()
 
 
-def test_closing_one_renderer_leaves_the_others_drawing(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
+def test_closing_one_renderer_keeps_the_others(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     first, second = Renderer(fps=1000, size=SIZE), Renderer(fps=1000, size=(300, 300))
     first.show(frame_of(free))
@@ -200,7 +203,7 @@ def test_closing_one_renderer_leaves_the_others_drawing(monkeypatch: pytest.Monk
     assert first.draw(frame_of(free)).shape == (640, 640, 3)
 
 
-def test_window_keeps_to_its_rate(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
+def test_window_keeps_its_frame_rate(monkeypatch: pytest.MonkeyPatch, free: Equilibrium) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     from time import perf_counter
 

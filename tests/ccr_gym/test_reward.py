@@ -1,4 +1,4 @@
-"""The reward's terms, for numbers of one step."""
+"""Reward terms of single steps."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ def terms(force, desired=0.1, clearance=0.0, effort=0.0):
     )
 
 
-def test_the_set_point_is_the_best_place():
+def test_reward_is_largest_at_the_set_point():
     at = sum(terms(0.1).values())
     assert at == pytest.approx(1.0)
     assert all(sum(terms(force).values()) < at for force in (0.0, 0.09, 0.099, 0.101, 0.11, 0.5))
 
 
-def test_each_term_reads_what_it_names():
+def test_each_term_measures_what_it_names():
     assert terms(0.12)["overshoot"] == pytest.approx(-0.1)
     assert terms(0.08)["overshoot"] == 0
     assert terms(0.0, clearance=50.0)["approach"] == pytest.approx(-0.5)
@@ -39,7 +39,7 @@ def test_weights_scale_their_terms():
         assert twice == pytest.approx([2 * term for term in once])
 
 
-def test_arrays_give_the_numbers_of_each_entry():
+def test_arrays_agree_with_numbers():
     forces = np.array([0.0, 0.08, 0.1, 0.2])
     desired, clearance = np.full(4, 0.1), np.full(4, 3.0)
     errors = np.abs(forces - desired) / desired

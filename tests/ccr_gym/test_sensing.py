@@ -1,13 +1,12 @@
-"""What is not ideal: latency, noise, backlash, unknown friction and rigidity; and scenes that are kept for testing."""
+"""Imperfections: latency, noise, backlash, unknown friction and rigidity; and the split of scenes."""
 
 import gymnasium
 import numpy as np
 import pytest
 
 import ccr_gym
-from ccr_gym import Sensing
-from ccr_gym.observation import FORCE_SCALE_N
-from ccr_gym.tasks import in_test_split
+from ccr_gym import FORCE_SCALE_N, Sensing
+from ccr_gym.sampling import in_test_split
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 EXACT = {name: (0.0, 0.0) for name in ("noise_n", "bias_n", "backlash_mm", "tendon_loss")} | {
@@ -20,7 +19,7 @@ def make(env_id, **kwargs):
 
 
 def play(env, seed=3, steps=40):
-    """Observations and infos of steps drawn at random towards pulling."""
+    """Return observations and infos of random steps that mostly pull."""
     generator = np.random.default_rng(0)
     record = [env.reset(seed=seed)]
     for _ in range(steps):
@@ -30,18 +29,18 @@ def play(env, seed=3, steps=40):
 
 
 @EVERY_ID
-def test_without_any_error_it_is_ideal(env_id):
+def test_zero_imperfections_are_ideal(env_id):
     ideal = play(make(env_id))
     exact = play(make(env_id, sensing={**EXACT, "latency": [0, 0]}))
-    for (seen, info), (same, told) in zip(ideal, exact, strict=True):
-        assert seen.keys() == same.keys()
-        for key, value in seen.items():
-            assert same[key] == pytest.approx(value, abs=2e-6), key
-        assert told["force_true"] == pytest.approx(info["force_true"], abs=1e-9)
+    for (observed, info), (other, other_info) in zip(ideal, exact, strict=True):
+        assert observed.keys() == other.keys()
+        for key, value in observed.items():
+            assert other[key] == pytest.approx(value, abs=2e-6), key
+        assert other_info["force_true"] == pytest.approx(info["force_true"], abs=1e-9)
 
 
 @EVERY_ID
-def test_what_is_late_is_what_was(env_id):
+def test_delayed_entries_are_those_of_earlier_steps(env_id):
     ideal = play(make(env_id))
     late = play(make(env_id, sensing={**EXACT, "latency": [2, 2]}))
     for k, (seen, _) in enumerate(late):
@@ -52,7 +51,7 @@ def test_what_is_late_is_what_was(env_id):
 
 
 @EVERY_ID
-def test_vector_and_single_environments_are_the_same(env_id):
+def test_vector_and_single_environments_agree(env_id):
     kwargs = {"sensing": "realistic", "obs_mode": "flat"}
     ours = gymnasium.make_vec(env_id, 3, vectorization_mode="vector_entry_point", max_episode_steps=9, **kwargs)
     theirs = gymnasium.make_vec(env_id, 3, vectorization_mode="sync", max_episode_steps=9, **kwargs)
@@ -68,51 +67,51 @@ def test_vector_and_single_environments_are_the_same(env_id):
 
 @EVERY_ID
 @pytest.mark.parametrize("sensing", ["ideal", "realistic"])
-def test_the_truth_of_many_is_that_of_each_and_trying_a_move_tells_its_force(env_id, sensing):
+def test_privileged_states_and_probes_agree_with_single_environments(env_id, sensing):
     envs = gymnasium.make_vec(env_id, 3, vectorization_mode="vector_entry_point", sensing=sensing)
     singles, generator = [make(env_id, sensing=sensing).unwrapped for _ in range(3)], np.random.default_rng(1)
     envs.reset(seed=4)
     for i, env in enumerate(singles):
         env.reset(seed=4 + i)
     for _ in range(25):
-        truth = envs.privileged_state
+        state = envs.privileged_state
         for i, env in enumerate(singles):
-            for many, one in zip(truth, env.privileged_state, strict=True):
+            for many, one in zip(state, env.privileged_state, strict=True):
                 assert np.array_equal(many[i], one)
         actions = generator.uniform(-0.3, 1, envs.action_space.shape).astype(np.float32)
         envs.step(actions)
         for env, action in zip(singles, actions, strict=True):
             env.step(action)
-        assert envs.probe(envs.privileged_state.places) == pytest.approx(envs.privileged_state.force, abs=1e-6)
-        assert singles[0].probe(singles[0].privileged_state.places) == pytest.approx(
+        assert envs.probe(envs.privileged_state.actuated_mm) == pytest.approx(envs.privileged_state.force, abs=1e-6)
+        assert singles[0].probe(singles[0].privileged_state.actuated_mm) == pytest.approx(
             singles[0].privileged_state.force, abs=1e-6
         )
 
 
-def test_backlash_is_taken_up_before_anything_moves():
+def test_backlash_is_taken_up_before_the_cable_moves():
     env = make("CCR/PushObstacle-v0", sensing={**EXACT, "latency": [0, 0], "backlash_mm": [0.4, 0.4]})
     env.reset(seed=0)
     moved = [env.step(np.full(1, action, np.float32))[4]["cable_mm"] for action in (1, 1, -0.4, -0.4, -0.4)]
     assert moved == pytest.approx([0.3, 0.8, 0.8, 0.8, 0.6])
     observation, *_ = env.step(np.zeros(1, np.float32))
-    assert 14 * observation["cable"][0] == pytest.approx(0.4)  # the motor tells where it is
+    assert 14 * observation["cable"][0] == pytest.approx(0.4)  # the encoder reads the motor
 
 
-def test_forces_grow_with_the_rigidity_and_shapes_do_not_change():
+def test_rigidity_scales_forces_and_keeps_shapes():
     soft, stiff = (
         play(make("CCR/PushObstacle-v0", sensing={**EXACT, "latency": [0, 0], "rigidity_ratio": [s, s]}))
         for s in (0.5, 2.0)
     )
     touched = False
-    for (seen, info), (same, told) in zip(soft, stiff, strict=True):
-        assert np.array_equal(seen["nodes"], same["nodes"])
-        assert told["force_true"] == pytest.approx(4 * info["force_true"])
-        assert told["force_est"] == pytest.approx(4 * info["force_est"])
+    for (observed, info), (other, other_info) in zip(soft, stiff, strict=True):
+        assert np.array_equal(observed["nodes"], other["nodes"])
+        assert other_info["force_true"] == pytest.approx(4 * info["force_true"])
+        assert other_info["force_est"] == pytest.approx(4 * info["force_est"])
         touched |= bool(info["force_true"].any())
     assert touched
 
 
-def test_noise_and_bias_have_the_size_that_is_asked_for():
+def test_noise_and_bias_have_the_requested_magnitudes():
     sensing = {**EXACT, "latency": [0, 0], "noise_n": [0.002, 0.002], "bias_n": [0.004, 0.004]}
     env, errors = make("CCR/PushObstacle-v0", sensing=sensing), []
     for seed in range(20):
@@ -125,7 +124,7 @@ def test_noise_and_bias_have_the_size_that_is_asked_for():
 
 
 @EVERY_ID
-def test_training_and_test_scenes_have_none_in_common(env_id):
+def test_training_and_test_scenes_are_disjoint(env_id):
     for split in ("train", "test"):
         env = make(env_id, split=split)
         for seed in range(12):
@@ -144,11 +143,11 @@ def test_training_and_test_scenes_have_none_in_common(env_id):
         ({"split": "validation"}, "split is"),
     ],
 )
-def test_what_it_refuses(kwargs, message):
+def test_invalid_ranges_are_refused(kwargs, message):
     with pytest.raises(ValueError, match=message):
         make("CCR/PushObstacle-v0", **kwargs)
 
 
-def test_the_ranges_are_kept():
+def test_realistic_sensing_is_the_default_ranges():
     assert make("CCR/PushObstacle-v0", sensing="realistic").unwrapped.settings.sensors == Sensing()
     assert make("CCR/PushObstacle-v0").unwrapped.settings.sensors is None

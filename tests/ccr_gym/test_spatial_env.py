@@ -1,11 +1,10 @@
-"""What only the environment in space has: vectors as set-points, what is seen of the obstacle, its settings."""
+"""The environment in space: force vectors as set-points, obstacle features, settings."""
 
 import gymnasium
 import numpy as np
 import pytest
 
-from ccr_gym.environments import SpatialPushEnv
-from ccr_gym.observation import FORCE_SCALE_N
+from ccr_gym import FORCE_SCALE_N, SpatialPushEnv
 from solver import Circle, Scene
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
@@ -16,20 +15,20 @@ def make(**kwargs):
     return gymnasium.make("CCR/SpatialPush-v0", disable_env_checker=True, **kwargs)
 
 
-def test_the_table_of_indices_holds():
+def test_docstring_lists_the_indices_of_the_flat_observation():
     env = make(obs_mode="flat")
     flat, _ = env.reset(seed=0)
-    places, start = {}, 0
+    columns, start = {}, 0
     for key, box in make().observation_space.items():
-        places[key] = (start, start + box.shape[0] - 1)
+        columns[key] = (start, start + box.shape[0] - 1)
         start += box.shape[0]
     assert flat.shape == (283,)
-    for key, (first, last) in places.items():
+    for key, (first, last) in columns.items():
         ends = f"{first}–{last}" if last > first else f"{first}"
         assert f"{ends} | `{key}`" in SpatialPushEnv.__doc__ or key == "contact"
 
 
-def test_what_is_seen_is_where_it_is():
+def test_observation_matches_the_equilibrium():
     env = make()
     kinds = set()
     for seed in range(8):
@@ -51,8 +50,7 @@ def test_what_is_seen_is_where_it_is():
     assert kinds == {Sphere, Cylinder}
 
 
-def test_a_vector_can_be_asked_for():
-    """Its set-point is a force that a steady pull gets to, beside the obstacle's direction."""
+def test_vector_set_points_are_forces_that_a_ramp_ends_with():
     env = make(**VECTOR)
     for seed in range(5):
         observation, info = env.reset(seed=seed)
@@ -71,7 +69,7 @@ def test_a_vector_can_be_asked_for():
         env.reset(options={"scene": scene, "desired_force": 0.1})
 
 
-def test_the_vector_form_is_that_of_single_environments():
+def test_vector_environment_agrees_with_single_ones():
     ours = gymnasium.make_vec("CCR/SpatialPush-v0", 3, vectorization_mode="vector_entry_point", **VECTOR)
     theirs = gymnasium.make_vec("CCR/SpatialPush-v0", 3, vectorization_mode="sync", **VECTOR)
     (our, our_infos), (their, their_infos) = ours.reset(seed=4), theirs.reset(seed=4)
@@ -86,12 +84,12 @@ def test_the_vector_form_is_that_of_single_environments():
         assert np.array_equal(our_rewards, their_rewards)
 
 
-def test_settings():
+def test_robot_and_backend_are_validated():
     assert make().unwrapped.settings.robot == SpatialRobot.prototype()
     robot = {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0, "angle": 2.0, "between": 1}
     observation, _ = make(robot=robot, obs_mode="dict").reset(seed=0)
     assert observation["nodes"].shape == (39,)
     with pytest.raises(ValueError, match="in space it must be 'native'"):
         make(backend="casadi")
-    with pytest.raises(ValueError, match="of the plane"):
+    with pytest.raises(ValueError, match="not in the plane"):
         make().reset(options={"scene": Scene([Circle(center=(44, 104), radius=15)]), "desired_force": 0.1})

@@ -1,4 +1,4 @@
-"""The vector environment against Gymnasium's synchronous one around single environments, bit for bit."""
+"""The vector environment is bit-identical to Gymnasium's synchronous one."""
 
 import gymnasium
 import numpy as np
@@ -28,7 +28,7 @@ def make_both(env_id, mode, **kwargs):
 
 
 def same(ours, theirs):
-    """Equal structure, types and bits."""
+    """Assert equal structure, types and bits."""
     if isinstance(theirs, dict):
         assert ours.keys() == theirs.keys()
         for key in theirs:
@@ -50,7 +50,7 @@ def same(ours, theirs):
 @EVERY_ID
 @EVERY_MODE
 @pytest.mark.parametrize("obs_mode", ["dict", "flat"])
-def test_equals_single_environments(pytestconfig, env_id, mode, obs_mode):
+def test_results_are_those_of_single_environments(pytestconfig, env_id, mode, obs_mode):
     ours, theirs = make_both(env_id, mode, obs_mode=obs_mode)
     assert ours.observation_space == theirs.observation_space
     assert ours.action_space == theirs.action_space
@@ -81,7 +81,7 @@ def test_results_do_not_depend_on_threads(env_id):
         assert all(np.array_equal(a, b) for a, b in zip(records[0], record, strict=True))
 
 
-def test_without_a_seed_episodes_differ_and_go_on():
+def test_unseeded_episodes_differ():
     env = gymnasium.make_vec("CCR/PushObstacle-v0", 3, vectorization_mode="vector_entry_point")
     first, _ = env.reset()
     again, _ = env.reset()

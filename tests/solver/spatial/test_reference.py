@@ -8,7 +8,7 @@ import pytest
 
 from solver import Scene, Status
 from solver.spatial import Box, Capsule, Cylinder, SpatialReferenceSolver, SpatialRobot, SpatialSolver, Sphere
-from solver.spatial.formulation import spatial_problem
+from solver.spatial.formulation import node_problem
 
 SPRING = ((0.3, 0.1, 0), (0.1, 0.5, 0), (0, 0, 0.2))
 SCENES = {
@@ -80,7 +80,7 @@ def test_a_robot_of_another_size_is_followed_alike(s):
 
 
 def test_derivatives_are_smooth_where_disks_are_parallel(robot):
-    problem = spatial_problem(robot, (), ())
+    problem = node_problem(robot, (), ())
     slope = ca.Function(
         "slope", [problem.unknowns, problem.parameters], [ca.gradient(problem.objective, problem.unknowns)]
     )

@@ -37,7 +37,7 @@ def pulled(robot):
     [
         ({"length_mm": 1e-320}, "length_mm is .*; it must be positive and finite, from 1e-30 to 1e"),
         ({"rigidity": 1.7e308}, r"rigidity is 1.7e\+308; it must be positive and finite, from 1e-60 to 1e\+60"),
-        ({"angle": 0.3}, "angle is 0.3; it must be from π/6 to 5π/6 either way: cables nearer"),
+        ({"angle": 0.3}, "angle is 0.3; it must be from π/6 to 5π/6 either way: nearer to one plane"),
         ({"angle": 2.85}, "angle is 2.85; it must be from π/6 to 5π/6 either way"),
         ({"angle": math.nan}, "angle is nan; it must be finite"),
         ({"angle": "1"}, "angle is '1'; it must be finite"),
@@ -155,7 +155,7 @@ def test_a_robot_put_among_other_obstacles_rests_before_it_moves(robot):
     batch.rest([0, 1])
     batch.step(np.full((2, 2), 5))
     batch.assign(1, Scene([Sphere(center=(48, 0, 110), radius=15)]))
-    message = r"robot 1 was put among other obstacles, or its rest was cut short; call rest\(\[1\]\) before it moves"
+    message = r"robot 1 has a new scene, or its rest was interrupted; call rest\(\[1\]\) before it moves"
     with pytest.raises(ValueError, match=message):
         batch.step(np.full((2, 2), 5.0))
     for commands in (np.full(2, 5.0), np.full((2, 2), 13.0), np.full((2, 3), 1.0)):

@@ -1,0 +1,1 @@
+"""The benchmark: episodes, metrics, tables and figures."""

@@ -1,0 +1,150 @@
+"""Results of the benchmark as JSON, tables, figures and model cards."""
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from agents.benchmark.cards import card
+from agents.benchmark.figures import draw_curves, draw_episodes, draw_profiles, draw_scores
+from agents.benchmark.suite import Result
+from agents.config import EvaluateConfig
+from agents.files import JsonObject, write_text
+from agents.learning.actor import LearningCurve
+from agents.learning.pretrained import folder_name
+
+NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
+WIDTH = 190  # of a printed table
+BOUND, BASELINE = "Oracle", "PI"
+COLUMNS: dict[str, Callable[[JsonObject], str]] = {  # heading of a column, and its text from a summary
+    "force error [mN]": lambda s: "{:.2f} [{:.2f}, {:.2f}]".format(s["rmse_iqm_mn"], *s["rmse_interval_mn"]),
+    "first seed": lambda s: f"{s['rmse_of_seeds_mn'][0]:.2f}" if len(s["rmse_of_seeds_mn"]) > 1 else "",
+    "worst tenth": lambda s: f"{s['rmse_cvar_mn']:.1f}",
+    "steady": lambda s: f"{s['steady_mn']:.2f}",
+    "within 5 %": lambda s: f"{s['success']:.0%}",
+    "settled": lambda s: f"{s['settling_step']:.0f}",
+    "overshoot": lambda s: f"{s['overshoot']:.0%}",
+    "contact lost": lambda s: f"{s['contact_losses']:.2f}",
+    "peak [mN]": lambda s: f"{s['peak_mn']:.0f}",
+    "over limit": lambda s: f"{s['violations']:.2f}",
+    "by estimate [mN]": lambda s: f"{s['estimate_rmse_mn']:.0f}",
+    "events": lambda s: f"{1 - s['statuses'].get('CONVERGED', 0) / sum(s['statuses'].values()):.2%}",
+    "decisions/s": lambda s: f"{s['decisions_per_second']:.0f}",
+    "training": lambda s: f"{s['training_seconds']:.0f} s" if s["training_seconds"] else "",
+}
+HEADINGS = ("policy", "closed", *COLUMNS)
+Grouped = dict[str, list[Result]]  # results by environment
+
+
+def write(results: list[Result], config: EvaluateConfig) -> None:
+    """Write results, tables, figures and model cards into the folder of an evaluation, and print the tables."""
+    report = {"episodes": config.episodes, "seed": config.seed, "split": "test"}
+    values = report | {"results": [result.as_dict() for result in results]}
+    write_text(config.out / "evaluation.json", json.dumps(values) + "\n")
+    first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
+    write_text(config.out / "scores.json", json.dumps(first) + "\n")
+    by_id = group(results)
+    write_text(config.out / "evaluation.md", f"{matrix(by_id)}\n{markdown(by_id)}")
+    _write_cards(by_id, config)
+    _draw(by_id, config)
+    show(by_id)
+
+
+def _write_cards(by_id: Grouped, config: EvaluateConfig) -> None:
+    for env_id, here in by_id.items():
+        for result in here:
+            if result.trainings:
+                folder = config.out / "cards" / result.entry.policy / folder_name(env_id)
+                folder.mkdir(parents=True, exist_ok=True)
+                write_text(folder / "README.md", card(result, here, config))
+
+
+def _draw(by_id: Grouped, config: EvaluateConfig) -> None:
+    for env_id, here in by_id.items():
+        draw_episodes({r.entry.policy: r.shown for r in here}, config.out / f"{folder_name(env_id)}.png")
+    draw_scores({env_id: {r.entry.policy: r.summary for r in here} for env_id, here in by_id.items()}, config.out)
+    errors = {env_id: {r.entry.policy: r.rmse.ravel() for r in here} for env_id, here in by_id.items()}
+    draw_profiles(errors, config.out)
+    if any(result.trainings for here in by_id.values() for result in here):
+        draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
+
+
+def group(results: list[Result]) -> Grouped:
+    """Return results by environment, in the given order."""
+    by_id: Grouped = {}
+    for result in results:
+        by_id.setdefault(result.entry.env_id, []).append(result)
+    return by_id
+
+
+def closed(result: Result, rivals: list[Result]) -> float | None:
+    """Return the share of the gap between the force errors of the baseline and the bound that a policy closes."""
+    errors = {r.entry.policy: float(r.summary["rmse_iqm_mn"]) for r in rivals}
+    if BOUND not in errors or BASELINE not in errors:
+        return None
+    return (errors[BASELINE] - float(result.summary["rmse_iqm_mn"])) / (errors[BASELINE] - errors[BOUND])
+
+
+def is_below(result: Result, rivals: list[Result]) -> bool:
+    """Return whether a policy's interval lies below that of the baseline."""
+    others = [r.summary["rmse_interval_mn"] for r in rivals if r.entry.policy == BASELINE]
+    return bool(others) and result.summary["rmse_interval_mn"][1] < others[0][0]
+
+
+def cells(result: Result, rivals: list[Result]) -> list[str]:
+    """Return a row of the table."""
+    summary, share = result.summary, closed(result, rivals)
+    gain = "" if share is None else f"{share:.0%}" + (" *" if is_below(result, rivals) else "")
+    return [result.entry.policy, gain, *(text(summary) for text in COLUMNS.values())]
+
+
+def markdown(by_id: Grouped) -> str:
+    """Return a table for every environment, in Markdown."""
+    lines: list[str] = []
+    for env_id, here in by_id.items():
+        lines += [f"### {env_id}", "", "| " + " | ".join(HEADINGS) + " |", "| --- " * len(HEADINGS) + "|"]
+        lines += ["| " + " | ".join(cells(result, here)) + " |" for result in here]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def matrix(by_id: Grouped) -> str:
+    """Return the force errors of all policies on all environments as one table in Markdown, winners in bold.
+
+    A policy wins if it closes at least half of the gap between baseline and bound, and its interval lies below that of
+    the baseline.
+    """
+    names = list(dict.fromkeys(result.entry.policy for here in by_id.values() for result in here))
+    lines = ["| id | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
+    for env_id, here in by_id.items():
+        found = {result.entry.policy: result for result in here}
+        lines.append(f"| `{env_id}` | " + " | ".join(_cell(found.get(name), here) for name in names) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(result: Result | None, rivals: list[Result]) -> str:
+    if result is None:
+        return ""
+    summary = result.summary
+    low, high = summary["rmse_interval_mn"]
+    text = f"{summary['rmse_iqm_mn']:.2f} [{low:.2f}, {high:.2f}]"
+    wins = (closed(result, rivals) or 0) >= 0.5 and is_below(result, rivals) and result.entry.policy != BOUND
+    return f"**{text}**" if wins else text
+
+
+def show(by_id: Grouped) -> None:
+    """Print the tables."""
+    console = Console(width=max(WIDTH, Console().width))
+    for env_id, here in by_id.items():
+        table = Table(title=f"{env_id}, {here[0].entry.sensing} sensing")
+        for heading in HEADINGS:
+            table.add_column(heading, justify="left" if heading == "policy" else "right", no_wrap=heading in NARROW)
+        for result in here:
+            table.add_row(*cells(result, here))
+        console.print(table)
+
+
+def _curves(results: list[Result]) -> dict[str, list[LearningCurve]]:
+    return {r.entry.policy: [training.curve for training in r.trainings] for r in results if r.trainings}

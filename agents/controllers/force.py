@@ -1,0 +1,59 @@
+"""Proportional and proportional-integral control of the contact force."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from agents.controllers.tare import Tare
+from agents.environment import Environment
+from agents.policy import Observation, search
+from agents.tuned import P_GAINS, PI_GAINS
+from ccr_gym import FORCE_SCALE_N
+
+
+@dataclass(slots=True)
+class ForceController:
+    """Proportional-integral control of the contact force's magnitude, after a search for contact at full speed.
+
+    The mean sensor reading before contact is subtracted. The action is the change of the controller's output (velocity
+    form), so the integral does not wind up at saturation. In space both cables move in the direction of the search; an
+    insertion stays where it is.
+
+    Attributes:
+        proportional: Action per newton of change in the force error.
+        integral: Action per newton of force error.
+        name: Name of the policy.
+    """
+
+    proportional: float = 5.0
+    integral: float = 20.0
+    name: str = "PI"
+    _last: float | None = field(default=None, init=False)
+    _tare: Tare = field(default_factory=Tare, init=False)
+
+    @classmethod
+    def tuned(cls, env_id: str) -> "ForceController":
+        """Return the controller with the gains that were best on training scenes with realistic sensing."""
+        return cls(*PI_GAINS[env_id])
+
+    @classmethod
+    def proportional_only(cls, env_id: str) -> "ForceController":
+        """Return the tuned controller whose action is proportional to the force error."""
+        return cls(0.0, P_GAINS[env_id], "P")
+
+    def reset(self, env: Environment | None = None) -> None:
+        """Forget the last error and the zero of the sensor."""
+        self._last = None
+        self._tare.reset()
+
+    def act(self, observation: Observation) -> np.ndarray:
+        """Return the search action until something touches, then control the force."""
+        force = self._tare.force(observation)
+        if force is None:
+            self._last = None
+            return search(observation)
+        error = FORCE_SCALE_N * float(np.linalg.norm(observation["desired_force"])) - float(np.linalg.norm(force))
+        change = 0.0 if self._last is None else error - self._last
+        self._last = error
+        effort = min(max(self.proportional * change + self.integral * error, -1.0), 1.0)
+        return np.asarray(effort * search(observation), np.float32)

@@ -1,0 +1,31 @@
+"""Environments as policies use them."""
+
+import gymnasium
+import numpy as np
+
+import ccr_gym  # noqa: F401 - registers the ids
+
+Observation = dict[str, np.ndarray]
+Environment = gymnasium.Env[Observation, np.ndarray]
+EnvIndex = slice | list[int] | np.ndarray  # some of the robots or episodes of an array
+
+
+def make_env(env_id: str, **kwargs: object) -> Environment:
+    """Return an environment with dictionary observations, without Gymnasium's checker, which slows every step.
+
+    Args:
+        env_id: Id of the environment.
+        **kwargs: Arguments of the environment.
+    """
+    return gymnasium.make(env_id, None, True, obs_mode="dict", **kwargs)
+
+
+def require_env(env: Environment | None) -> Environment:
+    """Return the environment that a controller reads more from than observations.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    if env is None:
+        raise ValueError("env is None; this controller reads from its environment: call reset(env)")
+    return env

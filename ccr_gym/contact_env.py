@@ -1,0 +1,215 @@
+"""The single environment."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any, SupportsFloat, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from ccr_gym.actions import ActionSpec
+from ccr_gym.checks import check_array, check_choice, check_names, check_seed, check_type, refusal
+from ccr_gym.episodes import EpisodeBatch, ForceReading, PrivilegedState
+from ccr_gym.rendering import Frame, Renderer
+from ccr_gym.reward import TERMS
+from ccr_gym.scales import FORCE_SCALE_N
+from ccr_gym.settings import AnySettings
+from ccr_gym.tasks import AnyTask, Assignment, check_force, check_task
+from solver import Equilibrium, Scene
+from solver.spatial import SpatialEquilibrium
+
+Observation = np.ndarray | dict[str, np.ndarray]
+Info = dict[str, Any]  # Gymnasium's own type of infos and options
+RENDER_MODES = ["human", "rgb_array"]
+METADATA: Info = {"render_modes": RENDER_MODES, "render_fps": 20}
+SPACES = {2: "the plane", 3: "space"}
+
+
+class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
+    """An environment in which a robot pushes an obstacle with a desired force.
+
+    Every step is the exact equilibrium after a cable increment.
+
+    Args:
+        task: What an episode asks.
+        render_mode: ``None``, ``"rgb_array"`` or ``"human"``.
+        **settings: Fields of the task's settings, as :class:`ccr_gym.Settings`.
+
+    Raises:
+        TypeError: If an argument is unknown, or an object of the wrong class.
+        ValueError: If an argument is out of range; the message names the bound.
+    """
+
+    metadata = METADATA
+
+    def __init__(self, task: AnyTask, render_mode: str | None = None, **settings: object) -> None:
+        if render_mode is not None:
+            check_choice("render_mode", render_mode, choices=RENDER_MODES)
+        self.task, self.render_mode = task, render_mode
+        self.settings = make_settings(type(self).__name__, task, settings, ("task", "render_mode"))
+        self._episodes = EpisodeBatch(task, self.settings, 1)
+        self._renderer: Renderer | None = None
+        self._started = False
+        self.observation_space, self.action_space = single_spaces(self._episodes, self.settings)
+        self._shape = (self.action_spec.size,)
+
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observation, Info]:
+        """Start an episode with the straight robot and a new scene and set-point.
+
+        A reset that raises changes nothing: neither the episode nor the generator.
+
+        Args:
+            seed: Seed of the environment's generator, a whole number from 0 on; ``None`` to keep the generator.
+            options: ``{"scene": Scene, "desired_force": float}`` to give scene and set-point instead of sampling them
+                [N]; the force is a vector where the task's set-point is one.
+
+        Raises:
+            RuntimeError: If no feasible scene is found: the task does not suit the robot.
+            TypeError: If the options are not a mapping, or the scene is not a Scene.
+            ValueError: If the seed is not a whole number from 0 on, or the options are incomplete or out of range.
+        """
+        seed = check_seed("seed", seed)
+        given = _given_assignment(options, self.task)
+        generator = self._np_random, self._np_random_seed
+        super().reset(seed=seed)
+        try:
+            if given is None:
+                self._episodes.start_sampled([0], [self.np_random])
+            else:
+                self._episodes.start_given(0, given, self.np_random)
+        except BaseException:
+            self._np_random, self._np_random_seed = generator
+            raise
+        self._started = True
+        if self.render_mode == "human":
+            self.render()
+        reading = self._episodes.read(0)
+        return self._observation(reading), self._episodes.infos(reading, (0.0,) * len(TERMS), 0)
+
+    def step(self, action: np.ndarray) -> tuple[Observation, SupportsFloat, bool, bool, Info]:
+        """Move the cables by ``action · max_increment_mm``, as far as tension limit and obstacles allow.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+            ValueError: If the action is not finite real numbers of the right shape; the state does not change.
+        """
+        self._check_started("step")
+        checked = check_array("action", action, self._shape)
+        episodes = self._episodes
+        episodes.step(episodes.adapter.clip(checked), 0)
+        reading = episodes.read(0)
+        terms = tuple(map(float, episodes.rewards(reading, 0)))
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(reading), sum(terms), False, False, episodes.infos(reading, terms, 0)
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture, ``(H, W, 3)`` uint8, or show it in a window: robot, obstacles, forces and set-point."""
+        if self.render_mode is None or not self._started:
+            gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human', and a reset")
+            return None
+        self._renderer = self._renderer or Renderer(self.metadata["render_fps"])
+        reading = self._episodes.read(0)
+        frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, FORCE_SCALE_N)
+        if self.render_mode == "rgb_array":
+            return self._renderer.draw(frame)
+        self._renderer.show(frame)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    @property
+    def action_spec(self) -> ActionSpec:
+        """Bounds and increments of what the actions move."""
+        return self._episodes.actions
+
+    @property
+    def equilibrium(self) -> Equilibrium | SpatialEquilibrium:
+        """The present equilibrium; it is immutable.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+        """
+        self._check_started("equilibrium")
+        return self._episodes.equilibrium(0)
+
+    @property
+    def privileged_state(self) -> PrivilegedState:
+        """The hidden state, which agents do not observe.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+        """
+        self._check_started("privileged_state")
+        return self._episodes.privileged_state(0)
+
+    def probe(self, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return the contact force, ``(d,)`` [N], at other actuated coordinates ``(actions,)`` [mm]; nothing moves.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+            ValueError: If the coordinates are not finite real numbers of the right shape.
+        """
+        self._check_started("probe")
+        return np.asarray(self._episodes.probe(check_array("actuated_mm", actuated_mm, self._shape)[None])[0])
+
+    def _check_started(self, asked: str) -> None:
+        if not self._started:
+            raise gymnasium.error.ResetNeeded(f"call reset() before {asked}")
+
+    def _observation(self, reading: ForceReading) -> Observation:
+        row = self._episodes.observe(reading, 0)
+        return row if self.settings.obs_mode == "flat" else self._episodes.observer.entries(row)
+
+
+def single_spaces(episodes: EpisodeBatch, settings: AnySettings) -> tuple[spaces.Space[Observation], spaces.Box]:
+    """Return the observation and action space of a single environment."""
+    observer = episodes.observer
+    action_space = spaces.Box(-1.0, 1.0, (episodes.actions.size,), np.float32)
+    flat = settings.obs_mode == "flat"
+    return cast("spaces.Space[Observation]", observer.flat_space if flat else observer.dict_space), action_space
+
+
+def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others: Sequence[str]) -> AnySettings:
+    """Return the settings of an environment, from its keyword arguments.
+
+    Args:
+        name: Name of the environment's class.
+        task: Its task.
+        given: The keyword arguments.
+        others: Its arguments that are not settings, which a message about an unknown argument lists.
+
+    Raises:
+        TypeError: If an argument is unknown, or an object of the wrong class.
+        ValueError: If an argument is out of range.
+    """
+    check_task(task)
+    settings_class = task.adapter.settings_class
+    make: Callable[..., AnySettings] = settings_class  # which checks the types itself
+    check_names(name, given, [*others, *(declared.name for declared in fields(settings_class))])
+    return make(**given)
+
+
+def _given_assignment(options: Info | None, task: AnyTask) -> Assignment | None:
+    """Return scene and set-point of reset options, or None without any."""
+    wanted = "None, or a mapping of both 'scene' and 'desired_force'"
+    check_type("options", options, Mapping | None, wanted)
+    if not options:
+        return None
+    if set(options) != {"scene", "desired_force"}:
+        raise refusal("options", options, wanted)
+    scene, space = options["scene"], task.adapter.space
+    check_type("scene", scene, Scene)
+    for obstacle in scene:
+        if obstacle.space != space:
+            raise refusal("scene", scene, f"of obstacles in {SPACES[space]}, not in {SPACES[obstacle.space]}")
+    shape = (space,) if task.force_vector else ()
+    force = check_array("desired_force", options["desired_force"], shape)
+    check_force("desired_force", math.hypot(*force) if shape else float(force))
+    return Assignment(scene, force)

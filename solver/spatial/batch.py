@@ -1,0 +1,39 @@
+"""Many robots in space, moved by one call."""
+
+import numpy as np
+
+from solver import _kernel
+from solver.common.batch import RobotBatch
+from solver.common.layout import SPACE, Layout
+from solver.common.scene import Scene
+from solver.common.status import Status
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
+from solver.spatial.robot import SpatialRobot
+from solver.spatial.solve import kernel_robot, kernel_scene
+
+
+class SpatialBatchSolver(RobotBatch[SpatialRobot, SpatialEquilibrium]):
+    """Moves many robots in space by one call, with the results of :class:`solver.spatial.SpatialSolver`.
+
+    See :class:`~solver.common.batch.RobotBatch`.
+    """
+
+    model = SPACE
+    robot_kind = SpatialRobot
+
+    def _straight_points(self) -> np.ndarray:
+        nodes = np.zeros((self.robot.segments + 1, 3))
+        nodes[:, 2] = np.linspace(0.0, self.robot.length_mm, len(nodes))
+        return touching_points(self.robot, nodes, np.tile(np.eye(3), (len(nodes), 1, 1)))
+
+    def _make_layout(self, obstacles: int) -> Layout:
+        return spatial_layout(self.robot, obstacles)
+
+    def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialBatch:
+        return _kernel.SpatialBatch(kernel_robot(self.robot), self.count, obstacles, threads)
+
+    def _kernel_obstacles(self, scene: Scene) -> list[_kernel.SpatialObstacle]:
+        return kernel_scene(self.robot, scene)
+
+    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> SpatialEquilibrium:
+        return SpatialEquilibrium(self.robot, scene, block, status, *work)

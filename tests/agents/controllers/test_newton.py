@@ -1,0 +1,30 @@
+import numpy as np
+import pytest
+
+from agents import ForceController, NewtonController
+from agents.benchmark.evaluate import run_episodes, scores
+from ccr_gym import ENV_IDS
+
+
+@pytest.mark.parametrize("env_id", sorted(ENV_IDS))
+@pytest.mark.parametrize("sensing", ["ideal", "realistic"])
+def test_what_is_hidden_is_enough_to_be_exact(env_id, sensing):
+    for episode in run_episodes(NewtonController.knowing(), env_id, seed=50, count=2, sensing=sensing):
+        assert np.median(episode.error[-20:]) < 0.01
+
+
+@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v0", "CCR/InsertAndPush-v0"])
+def test_without_what_is_hidden_newton_is_exact_if_nothing_is_and_far_from_the_oracle_else(env_id):
+    (ideal,) = run_episodes(NewtonController(), env_id, seed=50, count=1)
+    assert ideal.error[-1] < 1e-6
+    kwargs = {"sensing": "realistic", "split": "train"}
+    blind, oracle, integral = (
+        np.median(scores(policy, env_id, 50, 6, **kwargs))
+        for policy in (NewtonController(), NewtonController.knowing(), ForceController.tuned(env_id))
+    )
+    assert 5 * oracle < blind < 0.1 * integral
+
+
+def test_it_needs_its_environment():
+    with pytest.raises(ValueError, match=r"call reset\(env\)"):
+        NewtonController().reset()
