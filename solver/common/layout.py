@@ -90,10 +90,6 @@ class Layout:
             self.size = field.offset + field.size
 
 
-# Read by ccr_gym/bodies.py, which has no layout at hand where it declares what actions move.
-CABLE, LENGTH, TENSION = (getattr(Layout(PLANE, 1, 1, 1, 0), name).at for name in ("cables", "length", "tensions"))
-
-
 @lru_cache(maxsize=128)
 def make_layout(model: Model, segments: int, lines: int, positions: int, obstacles: int) -> Layout:
     """Return the layout for robots and scenes of these sizes."""

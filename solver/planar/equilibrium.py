@@ -27,7 +27,7 @@ class Equilibrium(BaseEquilibrium[Robot]):
 
     @property
     def cable_mm(self) -> float:
-        """Cable displacement l, which falls short of the command where the step stalled or was blocked [mm]."""
+        """Cable displacement l, which differs from the command where the step stalled or was blocked [mm]."""
         return float(self.block[self._layout.cables.at])
 
     @property

@@ -38,8 +38,8 @@ def with_friction(forces: np.ndarray, slopes: np.ndarray, friction: float) -> np
     normal = forces / np.maximum(size, TINY)
     against = -_dot(normal[..., None, :], slopes)  # how each displacement moves the tip into the surface
     motion = against[..., :1] * slopes[..., 0, :] + against[..., 1:] * slopes[..., 1, :]
-    sliding = motion - _dot(motion, normal)[..., None] * normal
-    return np.asarray(forces + friction * size * sliding / np.maximum(_norm(sliding), TINY))
+    slip = motion - _dot(motion, normal)[..., None] * normal
+    return np.asarray(forces + friction * size * slip / np.maximum(_norm(slip), TINY))
 
 
 def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> np.ndarray:

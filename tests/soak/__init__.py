@@ -1,7 +1,7 @@
-"""Random walks of the solver among ordinary and adversarial obstacles, and checks that share nothing with the kernel.
+"""Random walks of the solver among ordinary and adversarial obstacles, checked independently of the kernel.
 
-``scenes`` samples what an episode is played in, ``walks`` how the cables are pulled, ``checks`` tells what must hold of
-every step, with ``shapes`` (distances in numpy) and ``cores`` (whether the robot swept through an obstacle);
-``episodes`` puts them together, ``report`` adds up what was found, and ``cases`` makes it small and plays it again.
-``scale`` scales robots and scenes. ``python -m soak --help`` runs them in many processes.
+``scenes`` samples robots and scenes, ``walks`` samples commands, and ``checks`` states what must be true of every step,
+by distances in numpy (``shapes``) and by whether the robot swept through an obstacle (``cores``). ``episodes`` combines
+them, ``report`` sums up the findings, and ``cases`` shrinks and replays them. ``scale`` scales robots and scenes.
+``python -m soak --help`` runs episodes in many processes.
 """

@@ -1,4 +1,4 @@
-"""The soak in its long form: ``python -m soak --steps 3000000``."""
+"""The long soak: ``python -m soak --steps 3000000``."""
 
 import argparse
 import json
@@ -17,19 +17,19 @@ from soak.scenes import MODELS
 
 SHARES = {"paper": 0.4, "rod": 0.4, "space": 0.2}
 STEPS = 500  # of an episode
-REPORTS = 20  # on the way
-KEPT = 10  # cases of a kind that are made small and kept
+REPORTS = 20  # written in the course of a run
+KEPT = 10  # cases of each kind that are shrunk and kept
 
 
 class Report:
-    """What has been found so far, in a folder."""
+    """Findings so far, written to a folder."""
 
     def __init__(self, folder, models):
         self.folder, self.began = folder, time.time()
         self.tallies, self.cases, self.kept = {model: Tally() for model in models}, [], Counter()
 
     def add(self, model, tally, found):
-        """Add an episode; of each kind of finding only some cases are kept."""
+        """Add an episode; only some cases of each kind of finding are kept."""
         self.tallies[model].add(tally)
         for case in found:
             self.kept[model, case["kind"]] += 1
@@ -47,12 +47,12 @@ class Report:
 
     def __str__(self):
         found = "\n".join(f"{model}: {dict(t.findings) or 'nothing found'}" for model, t in self.tallies.items())
-        cases = f"cases are in {self.folder / 'cases.json'}; play one again with --case FILE INDEX"
+        cases = f"cases are in {self.folder / 'cases.json'}; replay one with --case FILE INDEX"
         return f"{table(self.tallies)}\n{found}\n{cases}\n{time.time() - self.began:.0f} s"
 
 
 def main():
-    """Run, write the table and the cases, and end with 1 where anything was found."""
+    """Run, write the table and the cases, and exit with 1 if anything was found."""
     options = _options()
     if options.case:
         sys.exit(_replay(*options.case))
@@ -73,7 +73,7 @@ def main():
 
 
 def _episodes(options):
-    """All episodes, shuffled, so that a part of them tells of all models."""
+    """Return all episodes, shuffled, so that a part of them represents all models."""
     total = sum(SHARES[model] for model in options.models)
     counts = {model: -(-int(options.steps * SHARES[model] / total) // STEPS) for model in options.models}
     episodes = [Episode(model, options.seed, k, STEPS) for model, count in counts.items() for k in range(count)]
@@ -82,7 +82,7 @@ def _episodes(options):
 
 
 def _replay(path, index):
-    """Play one case of a report again, and tell what it shows."""
+    """Replay one case of a report and print its findings; return whether there are none."""
     case = json.loads(Path(path).read_text())[int(index)]
     findings = find(case)
     print(json.dumps(case, indent=1), *findings, sep="\n")
@@ -96,7 +96,7 @@ def _options():
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("runs/soak"), help="folder of the report and the cases")
-    parser.add_argument("--case", nargs=2, metavar=("FILE", "INDEX"), help="play one case of cases.json again")
+    parser.add_argument("--case", nargs=2, metavar=("FILE", "INDEX"), help="replay one case of cases.json")
     return parser.parse_args()
 
 

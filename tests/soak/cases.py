@@ -1,4 +1,4 @@
-"""Cases to reproduce what a soak found: as JSON, made small, and replayed."""
+"""Cases that reproduce the findings of a soak: stored as JSON, shrunk and replayed."""
 
 import time
 from typing import Any
@@ -12,11 +12,11 @@ from soak.scenes import make_solver
 from soak.walks import replay
 from solver import Scene, spatial
 
-SECONDS = 15  # of processor time to make a case small
+SECONDS = 15  # of processor time to shrink a case
 
 
 def load(case: dict[str, Any]):
-    """Robot, scene and commands of a case."""
+    """Return robot, scene and commands of a case."""
     names = vars(solver) | {"SpatialRobot": spatial.SpatialRobot, "np": np, "inf": np.inf}
     if case["robot"].startswith("Spatial"):
         names |= vars(spatial)
@@ -25,14 +25,14 @@ def load(case: dict[str, Any]):
 
 
 def find(case):
-    """Everything found in a case when it is played from rest."""
+    """Return all findings of a case, played from rest."""
     robot, scene, commands = load(case)
     solver = make_solver(robot, scene)
     return check(solver, replay(solver, commands), Tally())
 
 
 def shrink(case):
-    """The same case with fewer obstacles and commands, as far as some seconds allow."""
+    """Return the case with fewer obstacles and commands, as far as some seconds allow."""
     if "commands" not in case:  # an episode that raised an error
         return case
     end = time.process_time() + SECONDS
@@ -45,7 +45,7 @@ def shrink(case):
 
 
 def _without(case, name, end, chunk):
-    """Leave out what of a list the case does not need, so many entries at a time."""
+    """Drop entries of a list that the case does not need, ``chunk`` of them at a time."""
     k = 0
     while k < len(case[name]) and time.process_time() < end:
         smaller = case | {name: case[name][:k] + case[name][k + chunk :]}
@@ -57,7 +57,7 @@ def _without(case, name, end, chunk):
 
 
 def _shows(case, kind):
-    """Whether a smaller case still shows a kind of finding, at its last step."""
+    """Return whether a smaller case still shows a kind of finding, at its last step."""
     if not case["commands"]:
         return False
     try:

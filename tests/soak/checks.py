@@ -1,4 +1,4 @@
-"""What must hold of every step of a walk."""
+"""Checks of every step of a walk."""
 
 import math
 from itertools import pairwise
@@ -11,17 +11,17 @@ from soak.shapes import distance
 from soak.walks import command_of, step
 from solver import Robot, Status
 
-FAR = 0.5  # of the shortest edge: a step that moves a point farther is looked at from one accepted shape to the next
+FAR = 0.5  # of the shortest edge: a step that moves a point farther is checked between its accepted shapes
 CERTIFY_EVERY = 1000
 MOST_FACTORIZATIONS = 5000
-MOST_BLOCKED = 3  # blocked steps of an episode that are tried another way
+MOST_BLOCKED = 3  # blocked steps of an episode that are retried in other ways
 DEEPEST = 1e-12  # of the robot's length
-INSIDE = 1e-11  # the same by the distances in numpy, which round differently
+INSIDE = 1e-11  # of the robot's length, by the distances in numpy, which round differently
 ROUNDOFF = 1e-12
 BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
-PRETENSION = 0.00625 * 1.001  # of the offset: a cable let out so far is as good as slack
-ASKED_AGAIN = 10  # times a command is repeated that was given up on
+PRETENSION = 0.00625 * 1.001  # of the offset: a cable displaced less is practically slack
+REPEATS = 10  # of a command that was given up on
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
 
 
@@ -34,7 +34,7 @@ class Finding(NamedTuple):
 
 
 def check(solver, taken, tally, offset=0):
-    """Everything that must not happen and did; what was measured is added to the tally."""
+    """Return all findings of a walk, and add its measurements to the tally."""
     findings = _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
     findings += _gave_up(solver, taken, tally) + _blocked(solver, taken, tally) + _cores(solver, taken, tally)
     tally.findings.update(finding.kind for finding in findings)
@@ -42,7 +42,7 @@ def check(solver, taken, tally, offset=0):
 
 
 def _states(solver, taken, tally):
-    """Numbers, gaps, tensions, verdicts and work of every state."""
+    """Check numbers, gaps, edges, tensions and work of every state."""
     states, robot = taken.states, solver.robot
     length = robot.length_mm
     finite = np.array([np.isfinite(state.block[~np.isposinf(state.block)]).all() for state in states])
@@ -70,7 +70,7 @@ def _tensions(state):
 
 
 def _first(kind, wrong, values):
-    """The first step at which something is wrong; what follows may follow from it."""
+    """Return the first wrong step only, as later ones may be its consequence."""
     return [Finding(kind, max(int(k) - 1, 0), float(values[k])) for k in np.flatnonzero(wrong)[:1]]
 
 
@@ -85,7 +85,7 @@ def _displacements(states):
 
 
 def _least_distance(solver, states):
-    """Least signed distance of the points that can touch to the obstacles that all can, ``(T+1,)`` [mm]."""
+    """Return the least signed distance to the obstacles that all points can touch, ``(T+1,)`` [mm]."""
     points, moved = _points(states), _displacements(states)
     distances = [
         distance(obstacle, points - moved[:, None, None, j]).min(axis=(1, 2))
@@ -96,7 +96,7 @@ def _least_distance(solver, states):
 
 
 def _optimality(solver, taken, tally, offset):
-    """The kernel's own measure of every state, and the node-coordinate certificate of events and now and then."""
+    """Check the kernel's residuals of every state, and the node-coordinate certificate of events and some others."""
     findings, certified = [], 0
     for k, (before, state) in enumerate(pairwise(taken.states)):
         worst = float(np.max(solver.optimality(state)))
@@ -116,7 +116,7 @@ def _optimality(solver, taken, tally, offset):
 
 
 def certificate(state):
-    """Worst residual of the node-coordinate problem in natural units."""
+    """Return the worst residual of the node-coordinate problem in natural units."""
     length, residuals = state.robot.length_mm, state.residuals()
     return max(
         residuals.stationarity * length,
@@ -128,7 +128,7 @@ def certificate(state):
 
 
 def _gave_up(solver, taken, tally):
-    """Steps given up on that nothing explains."""
+    """Check that every step given up on has an explanation."""
     gave_up = np.flatnonzero([state.status == Status.GAVE_UP for state in taken.states[1:]])
     reasons = [_reason(solver, taken, k) for k in gave_up]
     tally.reasons.update(reasons)
@@ -137,11 +137,12 @@ def _gave_up(solver, taken, tally):
 
 
 def _reason(solver, taken, k):
-    """Why a step was given up on.
+    """Return why a step was given up on.
 
-    ``folded``: the paper's models end where a segment folds over. ``slack``: a uniform cable without pretension leaves
-    the shape undetermined. ``crossing``: where a signed pair changes hands in contact, the paper's shape jumps.
-    ``far``: the command is too far for the work of one step, and is reached, or another verdict, when asked for again.
+    ``folded``: the branch ends where a segment of the paper's models folds over. ``slack``: without pretension the
+    shape of the paper's model is undetermined. ``crossing``: the pulled cable of a pair changes in contact, where the
+    shape of the paper's model jumps. ``far``: the command exceeds the work budget of one step, and repeating it leads
+    there or to another status.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = _trace(solver, taken.states[k], command).reason
@@ -154,7 +155,7 @@ def _reason(solver, taken, k):
             return "slack"
     elif np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"
-    for _ in range(ASKED_AGAIN):
+    for _ in range(REPEATS):
         state = step(solver, state, command)
         if state.status != Status.GAVE_UP:
             return "far"
@@ -162,20 +163,20 @@ def _reason(solver, taken, k):
 
 
 def _blocked(solver, taken, tally):
-    """Blocked steps, and whether another way gets on from there."""
+    """Report blocked steps, and whether the command can be reached in another way."""
     blocked = np.flatnonzero([state.status == Status.BLOCKED for state in taken.states[1:]])
     tally.blocked += len(blocked)
     findings = []
     for k in blocked[:MOST_BLOCKED].tolist():
         passed = _other_ways(solver, taken, k)
         tally.blocked_unconfirmed += passed
-        kind = "blocked, but not another way" if passed else "blocked"
+        kind = "blocked, but reached another way" if passed else "blocked"
         findings.append(Finding(kind, k, taken.states[k + 1].factorizations))
     return findings
 
 
 def _other_ways(solver, taken, k):
-    """Whether a command that was blocked is reached, or its tension limit is, in small steps or by another way."""
+    """Return whether a blocked command, or its tension limit, is reached in small steps or in another way."""
     before, command = taken.states[k], taken.commands[k]
     start = command_of(before)
     small = np.linspace(start, command, 41)[1:]
@@ -192,7 +193,7 @@ def _passes(solver, state, commands):
 
 
 def _cores(solver, taken, tally):
-    """Cores swept from state to state where all moves are small, else from one accepted shape to the next."""
+    """Check for swept cores from state to state where all moves are small, else between accepted shapes."""
     core, states = CoreCheck(solver.robot, solver.scene), taken.states
     if not core.obstacles:
         return []
@@ -201,10 +202,10 @@ def _cores(solver, taken, tally):
     motion = np.maximum(motion, np.linalg.norm(np.diff(moved, axis=0), axis=-1).max(axis=1, initial=0))
     snapped = np.array([state.status == Status.SNAPPED for state in states[1:]], bool)
     swept = core.swept(points, moved)
-    looked = snapped | (motion > FAR * min(solver.robot.edges_mm)) | swept.any(axis=1)
-    tally.traced += int(looked.sum())
+    suspect = snapped | (motion > FAR * min(solver.robot.edges_mm)) | swept.any(axis=1)
+    tally.traced += int(suspect.sum())
     findings = []
-    for steps in _chunks(np.flatnonzero(looked)):
+    for steps in _chunks(np.flatnonzero(suspect)):
         findings += [Finding("core swept", k, j) for k, j in _traced(solver, core, taken, steps)]
     tally.cores_swept += len(findings)
     return findings
@@ -215,7 +216,7 @@ def _chunks(steps, size=16):
 
 
 def _traced(solver, core, taken, steps):
-    """(step, obstacle) of cores that some steps swept."""
+    """Return (step, obstacle) of the cores that some steps swept."""
     ways = [accepted(solver, taken.states[k], taken.commands[k]) for k in steps]
     points, moved = (np.concatenate(parts) for parts in zip(*ways, strict=True))
     owner = np.repeat(steps, [len(way[0]) for way in ways])
@@ -224,7 +225,7 @@ def _traced(solver, core, taken, steps):
 
 
 def accepted(solver, state, command):
-    """Points, and displacements of obstacles, of all shapes accepted on the way of a step, with the first and last."""
+    """Return points and obstacle displacements of all shapes accepted on the way of a step, first and last included."""
     trace = _trace(solver, state, command)
     return trace.points, trace.displacements
 

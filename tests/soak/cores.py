@@ -1,9 +1,8 @@
-"""Whether an edge between neighbouring points that can touch swept over the core of an obstacle.
+"""Check that no edge between neighbouring points of the robot swept over the core of an obstacle.
 
-The core of an obstacle, seen from a line of such points, is what lies deeper in it than half of the longest edge that
-the line can have: a robot whose points stay outside and move continuously never gets there. Between two accepted shapes
-all points move straight. Obstacles on springs are looked at where they stand: points are counted from their
-displacement.
+For a line of points that can touch, the core of an obstacle is the part deeper than half of the longest edge that the
+line can have: a robot whose points stay outside and move continuously never gets there. Between two accepted shapes all
+points move in straight lines. For obstacles on springs, points are taken relative to their displacement.
 """
 
 import math
@@ -15,26 +14,26 @@ from solver import Robot
 
 DIRECTIONS, RINGS = 6, 16
 ZOOMS = 8
-SLACK = 1e-9  # of the longest edge: what roundoff may hide
+SLACK = 1e-9  # of the longest edge, for roundoff
 
 
 def line_points(robot, nodes, frames=None):
-    """The points that can touch of many shapes, ``(k, p, positions, d)``.
+    """Return the points that can touch, of many shapes, ``(k, p, positions, d)``.
 
     Args:
         robot: The robot.
-        nodes: Poses ``(k, n+1, 3)`` in the plane; places in space.
-        frames: Of the disks in space, ``(k, n+1, 3, 3)``.
+        nodes: Poses ``(k, n+1, 3)`` in the plane, points in space.
+        frames: Frames of the disks in space, ``(k, n+1, 3, 3)``.
     """
     if isinstance(robot, Robot):
         levers = np.stack([np.cos(nodes[..., 2]), np.sin(nodes[..., 2])], axis=-1)
         lines = nodes[:, None, :, :2] + np.array(robot.lines_mm)[:, None, None] * levers[:, None]
     else:
         lines = nodes[:, None] + np.einsum("knij,pj->kpni", frames[..., :2], robot.lines_mm)
-    return _divided(lines, robot.between)
+    return _subdivide(lines, robot.between)
 
 
-def _divided(lines, between):
+def _subdivide(lines, between):
     parts = np.arange(between + 1) / (between + 1)
     start, way = lines[:, :, :-1, None], np.diff(lines, axis=2)[:, :, :, None]
     inner = start + parts[:, None] * way
@@ -43,9 +42,10 @@ def _divided(lines, between):
 
 
 class CoreCheck:
-    """Looks for swept cores of the obstacles of one scene.
+    """Finds swept cores of the obstacles of one scene.
 
-    Those that only some nodes meet have none, and what is outside of a wall at both ends of a straight way stays so.
+    Obstacles that only some nodes touch have no core, and a point that is outside a wall at both ends of a straight
+    line stays outside.
     """
 
     def __init__(self, robot, scene):
@@ -56,12 +56,12 @@ class CoreCheck:
         self._candidates = {j: _candidates(obstacle) for j, obstacle in self.obstacles} if self.planar else {}
 
     def swept(self, points, displacements, linked=True):
-        """Which obstacles' cores were swept between consecutive shapes, ``(k-1, m)`` bool.
+        """Return which obstacles' cores were swept between consecutive shapes, ``(k-1, m)`` bool.
 
         Args:
             points: The points that can touch, ``(k, p, positions, d)`` [mm].
-            displacements: Of the obstacles, ``(k, m, d)`` [mm].
-            linked: Which pairs of neighbouring shapes follow one another, ``(k-1,)`` bool.
+            displacements: Displacements of the obstacles, ``(k, m, d)`` [mm].
+            linked: Which neighbouring shapes belong to the same motion, ``(k-1,)`` bool.
         """
         swept = np.zeros((len(points) - 1, displacements.shape[1]), bool)
         for line, longest in enumerate(self.edges):
@@ -70,44 +70,43 @@ class CoreCheck:
                 close = linked & _close(obstacle, seen, longest)
                 if close.any():
                     before, after = seen[:-1][close], seen[1:][close]
-                    swept[close, j] |= self._look(j, obstacle, before, after, longest)
+                    swept[close, j] |= self._is_swept(j, obstacle, before, after, longest)
         return swept
 
-    def _look(self, j, obstacle, before, after, longest):
+    def _is_swept(self, j, obstacle, before, after, longest):
         if not self.planar:
             return _deepest_patch(obstacle, before, after, longest)
-        places, depths = self._candidates[j]
+        points, depths = self._candidates[j]
         core = (depths > longest * (0.5 + SLACK)).reshape(RINGS, -1)
         outermost = core & (np.cumsum(core, axis=0) == 1)
-        seen_from = np.unique(places[outermost.ravel()], axis=0)
+        seen_from = np.unique(points[outermost.ravel()], axis=0)
         return (windings(before, after, seen_from) != 0).any(axis=-1)
 
 
-def windings(before, after, places):
-    """How often edges of lines ``(k, n, 2)`` crossed places ``(s, 2)`` as all points moved straight, ``(k, s)``.
+def windings(before, after, points):
+    """Return how often edges of lines ``(k, n, 2)`` crossed points ``(s, 2)`` in a straight motion, ``(k, s)``.
 
-    The sum of the signed angles of a line seen from a place changes as the directions of both ends do, and by whole
-    turns where an edge sweeps over it: the winding number of the closed way along the line before, with its end to
-    where that is now, back along the line now, and home with its start.
+    It is the winding number, about the point, of the closed path along the line before, with its end to the line
+    after, back along that line, and with its start to the first one: an edge that sweeps over the point adds a turn.
     """
     way = np.concatenate([before, after[:, ::-1], before[:, :1]], axis=1)
-    x, y = (way[:, None, :, axis] - places[:, None, axis] for axis in (0, 1))
+    x, y = (way[:, None, :, axis] - points[:, None, axis] for axis in (0, 1))
     below, above = y[..., :-1] <= 0, y[..., 1:] > 0
     left = x[..., :-1] * y[..., 1:] - x[..., 1:] * y[..., :-1] > 0
     return np.sum(below & above & left, axis=-1) - np.sum(~below & ~above & ~left, axis=-1)
 
 
 def _candidates(obstacle):
-    """Places in an obstacle, from its outline inwards, ``(RINGS * k, 2)``, and their depths."""
+    """Return points in an obstacle, from its outline inwards, ``(RINGS * k, 2)``, and their depths."""
     center, outline = np.array(obstacle.extent.center), obstacle.outline()
     rays = outline[:: max(1, len(outline) // DIRECTIONS)] - center
     shares = np.linspace(1, 0, RINGS + 1)[1:, None, None]
-    places = (center + shares * rays).reshape(-1, 2)
-    return places, depth(obstacle, places)
+    points = (center + shares * rays).reshape(-1, 2)
+    return points, depth(obstacle, points)
 
 
 def _close(obstacle, line, longest):
-    """Whether any edge of a line ``(k, n, d)`` can have come near an obstacle, by its points' distances, ``(k-1,)``."""
+    """Return whether any edge of a line ``(k, n, d)`` may have come near an obstacle, ``(k-1,)``."""
     center, radius = obstacle.extent[:2]
     offset = line - np.array(center)
     nearest = np.sqrt((offset * offset).sum(axis=-1).min(axis=1))
@@ -117,10 +116,10 @@ def _close(obstacle, line, longest):
 
 
 def _deepest_patch(obstacle, before, after, longest):
-    """Whether any edge of lines ``(k, n, 3)`` got deeper than half of the longest one on its way, ``(k,)``.
+    """Return whether any edge of lines ``(k, n, 3)`` got deeper than half of the longest one, ``(k,)``.
 
-    The depth is concave on the patch that an edge sweeps as long as that is flat, so zooming in on its largest value
-    finds it.
+    The depth is concave on the patch that an edge sweeps, as long as the patch is flat, so zooming in finds its
+    largest value.
     """
     swept = np.zeros(len(before), bool)
     corners = np.stack([before[:, :-1], before[:, 1:], after[:, :-1], after[:, 1:]], axis=2)  # (k, n-1, 4, 3)
@@ -134,15 +133,15 @@ def _deepest_patch(obstacle, before, after, longest):
 
 
 def _zoom(obstacle, corners):
-    """Largest depth on each patch ``(c, 4, 3)``, ``(c,)``."""
-    place, width = np.full((len(corners), 2), 0.5), 0.5
+    """Return the largest depth on each patch ``(c, 4, 3)``, ``(c,)``."""
+    center, width = np.full((len(corners), 2), 0.5), 0.5
     grid = np.stack(np.meshgrid(*2 * [np.linspace(-1, 1, 5)], indexing="ij"), axis=-1).reshape(-1, 2)
     for _ in range(ZOOMS):
-        uv = np.clip(place[:, None] + width * grid, 0, 1)
+        uv = np.clip(center[:, None] + width * grid, 0, 1)
         u, v = uv[..., :1], uv[..., 1:]
         a, b, c, d = (corners[:, None, k] for k in range(4))
         depths = -distance(obstacle, (1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d))
         best = depths.argmax(axis=1)
-        place = np.take_along_axis(uv, best[:, None, None], axis=1)[:, 0]
+        center = np.take_along_axis(uv, best[:, None, None], axis=1)[:, 0]
         width *= 0.6
     return depths.max(axis=1)

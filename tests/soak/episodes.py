@@ -1,4 +1,4 @@
-"""Episodes: a random walk in a sampled setting, and everything that is found in it."""
+"""Episodes: random walks in sampled settings, and their findings."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ STEPS = 250
 
 
 class Episode(NamedTuple):
-    """An episode, all of which follows from these."""
+    """Identity of an episode, which determines all of it."""
 
     model: str
     seed: int
@@ -22,13 +22,13 @@ class Episode(NamedTuple):
 
 
 def setting_of(episode):
-    """Its setting, and the generator that its commands come from."""
+    """Return the setting of an episode, and the generator of its commands."""
     generator = np.random.default_rng([episode.seed, MODELS.index(episode.model), episode.index])
     return sample_setting(generator, episode.model), generator
 
 
 def play(episode):
-    """Play an episode; its tally, and the cases to reproduce what was found."""
+    """Play an episode and return its tally, and the cases that reproduce its findings."""
     setting, generator = setting_of(episode)
     solver = setting.solver
     try:

@@ -1,4 +1,4 @@
-"""What a soak measured, added up, as JSON and as a table."""
+"""Measurements of a soak, summed up as JSON and as a table."""
 
 import math
 from collections import Counter
@@ -12,7 +12,7 @@ class Tally:
     """Counts and extremes over some steps; lengths are divided by the robot's, tensions by their limit.
 
     Attributes:
-        certificates_each: Node-coordinate certificates an episode may have at its events, which in space are slow.
+        certificates_each: Largest number of node-coordinate certificates at the events of an episode; slow in space.
     """
 
     steps: int = 0
@@ -40,7 +40,7 @@ class Tally:
 
     @classmethod
     def of(cls, model, setting, walk):
-        """What can be counted of an episode without checking it."""
+        """Return the counts of an episode that need no checks."""
         states = walk.states[1:]
         return cls(
             steps=len(states),
@@ -52,14 +52,14 @@ class Tally:
         )
 
     def add(self, other):
-        """Add what another one counted."""
+        """Add another tally to this one."""
         for name in (entry.name for entry in fields(self)):
             mine, theirs = getattr(self, name), getattr(other, name)
             worse = max if name in self.LARGEST else min if name.startswith("least") else lambda a, b: a + b
             setattr(self, name, worse(mine, theirs))
 
     def as_dict(self):
-        """For JSON."""
+        """Return the tally for JSON."""
         return vars(self) | {"contact_share": self.contact / max(1, self.steps)}
 
 
@@ -70,21 +70,21 @@ ROWS = {
     **{name.lower(): (lambda t, name=name: f"{t.statuses[name]:,}") for name in Status.__members__},
     **{f"gave up: {why}": (lambda t, why=why: f"{t.reasons[why]:,}") for why in REASONS},
     "cores swept": lambda t: f"{t.cores_swept}",
-    "steps looked at between": lambda t: f"{t.traced:,}",
+    "steps checked inside": lambda t: f"{t.traced:,}",
     "least gap / L": lambda t: f"{t.least_gap:.1e}",
     "least distance / L": lambda t: f"{t.least_distance:.1e}",
     "largest tension / limit": lambda t: f"{t.most_tension:.9f}",
     "worst optimality": lambda t: f"{t.worst_optimality:.1e}",
     "worst certificate": lambda t: f"{t.worst_certificate:.1e}",
     "certified / events": lambda t: f"{t.certified:,} / {t.events:,}",
-    "blocked, not another way": lambda t: f"{t.blocked_unconfirmed} of {t.blocked}",
+    "blocked, reached another way": lambda t: f"{t.blocked_unconfirmed} of {t.blocked}",
     "largest work of a step": lambda t: f"{t.most_factorizations:,}",
     "scenes refused": lambda t: f"{t.refused:,}",
 }
 
 
 def table(tallies):
-    """A Markdown table, one column for each named tally."""
+    """Return a Markdown table, one column for each named tally."""
     lines = [["", *tallies], ["---"] * (1 + len(tallies))]
     lines += [[row, *(show(tally) for tally in tallies.values())] for row, show in ROWS.items()]
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]

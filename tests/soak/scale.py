@@ -1,4 +1,4 @@
-"""The scaling law: lengths × s, rigidities × s², springs × 1/s leave forces, tensions and angles as they are."""
+"""Scaling law: lengths × s, rigidities × s² and springs × 1/s leave forces, tensions and angles unchanged."""
 
 from dataclasses import replace
 from functools import singledispatch
@@ -7,11 +7,11 @@ import numpy as np
 
 from solver import Capsule, Circle, Custom, Ellipse, HalfPlane, Obstacle, Polygon, Robot, Scene, spatial
 
-VANISHING = 1e-290  # smaller numbers have fewer bits, which do not scale
+VANISHING = 1e-290  # smaller numbers have fewer bits and do not scale exactly
 DIRECTIONS = ("normal", "axis", "second")
 CABLE_POWERS = {
     "objective": 0,
-    "nodes": None,  # places and, in the plane, angles
+    "nodes": None,  # points and, in the plane, angles
     "multipliers": -1,
     "gaps": 1,
     "displacements": 1,
@@ -23,15 +23,12 @@ SPATIAL_POWERS = {**CABLE_POWERS, "cables_mm": 1, "tensions": 0, "controls": 0, 
 
 
 def times(point, s):
-    """A point, pair, or range times a factor; None stays None."""
+    """Return a point, pair or range times a factor; None stays None."""
     return None if point is None else tuple(s * value for value in point)
 
 
 def scale_robot(robot, s):
-    """The same robot s times as large, with the same tensions and forces.
-
-    Custom shapes scale with their family: it must be one whose sizes are all lengths.
-    """
+    """Return the robot s times as large, with the same tensions and forces."""
     lengths = {
         "length_mm": s * robot.length_mm,
         "offset_mm": s * robot.offset_mm,
@@ -44,12 +41,12 @@ def scale_robot(robot, s):
 
 
 def scale_scene(scene, s):
-    """The same obstacles s times as large and as far, on springs 1/s times as stiff."""
+    """Return the obstacles s times as large and as far away, on springs 1/s times as stiff."""
     return Scene(scale_obstacle(obstacle, s) for obstacle in scene)
 
 
 def scale_obstacle(obstacle, s):
-    """One obstacle s times as large and as far."""
+    """Return an obstacle s times as large and as far away; sizes of a custom shape must all be lengths."""
     matrix = obstacle.spring and tuple(times(row, 1 / s) for row in obstacle.spring)
     scaled = replace(obstacle, spring=matrix, **_lengths(obstacle, s))
     for direction in DIRECTIONS:  # normalised once more on construction, which may change their last bits
@@ -108,9 +105,9 @@ def _(obstacle: spatial.Box, s):
 
 
 def natural(equilibrium, s=1.0):
-    """The numbers of an equilibrium of a robot scaled by s, as those of the robot at s = 1, by name.
+    """Return the numbers of an equilibrium of a robot scaled by s, by name, converted to the robot at s = 1.
 
-    With s a power of two the division is exact, so that the law holds to the last bit of every number that does not
+    With s a power of two the division is exact, so the law is true to the last bit of every number that does not
     vanish.
     """
     planar = isinstance(equilibrium.robot, Robot)
@@ -118,5 +115,5 @@ def natural(equilibrium, s=1.0):
     values = {name: np.asarray(getattr(equilibrium, name)) for name in powers}
     nodes = values.pop("nodes")
     numbers = {name: value / s ** powers[name] for name, value in values.items()}
-    numbers |= {"places": nodes[:, :2] / s, "angles": nodes[:, 2]} if planar else {"places": nodes / s}
+    numbers |= {"points": nodes[:, :2] / s, "angles": nodes[:, 2]} if planar else {"points": nodes / s}
     return {name: np.where(np.abs(value) < VANISHING, 0.0, value) for name, value in numbers.items()}

@@ -1,6 +1,6 @@
-"""What episodes are played in: robots of many kinds in scenes that are ordinary, or made to break the solver.
+"""Sampled settings of episodes: robots of many kinds in scenes that are ordinary, or made to break the solver.
 
-Everything is sampled around the paper's prototype, and scaled afterwards.
+Everything is sampled around the paper's prototype and then scaled.
 """
 
 import math
@@ -23,13 +23,13 @@ OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] 
 
 
 class Setting(NamedTuple):
-    """What an episode is played in.
+    """Robot and scene of an episode.
 
     Attributes:
-        kind: Name of the sampler of its scene.
-        scale: How large its robot is, beside the prototype.
-        solver: Of its robot and scene.
-        refused: How many scenes the solver would not take before.
+        kind: Name of the sampler of the scene.
+        scale: Size of the robot, over that of the prototype.
+        solver: Solver of robot and scene.
+        refused: Number of scenes that the solver refused before this one.
     """
 
     kind: str
@@ -39,7 +39,7 @@ class Setting(NamedTuple):
 
 
 def sample_setting(generator, model, kinds=None, scales=SCALES):
-    """A robot in a scene that leaves it clear at rest, and whose obstacles all have a core."""
+    """Return a robot in a scene that is clear of it at rest, and whose obstacles all have a core."""
     sample_robot, samplers = (spatial_robot, SPATIAL_KINDS) if model == "space" else (planar_robot, PLANAR_KINDS)
     for refused in range(TRIES):
         kind = str(generator.choice(kinds or list(samplers)))
@@ -54,12 +54,12 @@ def sample_setting(generator, model, kinds=None, scales=SCALES):
 
 
 def make_solver(robot, scene):
-    """The solver of a robot in the plane or in space."""
+    """Return the solver of a robot in the plane or in space."""
     return (Solver if isinstance(robot, Robot) else SpatialSolver)(robot, scene)
 
 
 def planar_robot(generator, model):
-    """The prototype, or one of more or fewer segments, other lines and points, and a base that inserts it."""
+    """Return the prototype, or a robot with other segments, lines and points, and a base that inserts it."""
     robot = replace(Robot.prototype(segments=int(generator.choice([9, 18, 18, 18, 30]))), model=model)
     if generator.random() < 0.5:
         robot = replace(robot, between=int(generator.integers(4)))
@@ -71,7 +71,7 @@ def planar_robot(generator, model):
 
 
 def spatial_robot(generator):
-    """The prototype, or one of fewer segments, other lines, points and angles."""
+    """Return the prototype, or a robot with fewer segments, other lines, points and angles."""
     robot = SpatialRobot.prototype(
         segments=int(generator.choice([9, 18, 18, 18])), angle=float(generator.choice([math.pi / 2, 2 * math.pi / 3]))
     )
@@ -83,7 +83,7 @@ def spatial_robot(generator):
 
 
 def _clear(generator, robot, sample, count, margin=None):
-    """So many sampled obstacles that stay clear of the straight robot, or fewer where there is no room."""
+    """Return ``count`` sampled obstacles that are clear of the straight robot, or fewer where there is no room."""
     margin = generator.choice([0.02, 1.0]) if margin is None else margin
     rest, kept = rest_points(robot), []
     for _ in range(8 * count):
@@ -96,7 +96,7 @@ def _clear(generator, robot, sample, count, margin=None):
 
 
 def rest_points(robot):
-    """Where the points of the straight robot are, ``(p * positions, d)``."""
+    """Return the points of the straight robot, ``(p * positions, d)``."""
     along = np.linspace(0, robot.length_mm, robot.segments + 1)
     nodes, frames = np.zeros((1, len(along), 3)), np.broadcast_to(np.eye(3), (1, len(along), 3, 3))
     nodes[0, :, 1 if isinstance(robot, Robot) else 2] = along
@@ -114,28 +114,28 @@ def _unit(generator, size):
 
 
 def _ahead(generator, low=20.0, high=80.0):
-    """A place that the pulled robot comes to, now and then one behind it."""
+    """Return a point that the pulled robot comes to, or sometimes one behind it."""
     side = -0.3 if generator.random() < 0.1 else 1
     return np.array([side * generator.uniform(low, high), generator.uniform(45, 185)])
 
 
 def _width(robot):
-    """Inner radius of an obstacle that surely has a core."""
+    """Return an inner radius that is large enough for a core."""
     return 0.66 * max(robot.edges_mm)
 
 
 # The plane.
 
 
-def _planar_shape(generator, robot, thinnest, spring):
+def _planar_shape(generator, thinnest, spring):
     center, axis = _ahead(generator), _unit(generator, 2)
     across, along = thinnest + generator.exponential(3, 2)
-    place = {"center": tuple(center), "spring": spring}
+    common = {"center": tuple(center), "spring": spring}
     match generator.integers(6):
         case 0:
-            return Circle(radius=across, **place)
+            return Circle(radius=across, **common)
         case 1:
-            return Ellipse(radii=(across, along), axis=tuple(axis), **place)
+            return Ellipse(radii=(across, along), axis=tuple(axis), **common)
         case 2:
             ends = {"start": tuple(center - along * axis), "end": tuple(center + along * axis)}
             return Capsule(radius=across, spring=spring, **ends)
@@ -143,7 +143,7 @@ def _planar_shape(generator, robot, thinnest, spring):
             return _polygon(generator, center, along + 2, across / 2, spring)
         case 4:
             return Custom(
-                family=OVAL, sizes=(across + 1, along + 1), axis=tuple(axis), reach=2.5 * (across + along), **place
+                family=OVAL, sizes=(across + 1, along + 1), axis=tuple(axis), reach=2.5 * (across + along), **common
             )
         case _:
             return HalfPlane(point=tuple(center), normal=(-1, generator.uniform(-1, 1)), spring=spring)
@@ -157,7 +157,7 @@ def _polygon(generator, center, size, radius, spring=None):
 
 
 def circles(generator, robot):
-    """One to three large circles."""
+    """Return one to three large circles."""
     low, high = (35, 75, 10), (75, 150, 16)
 
     def sample():
@@ -168,18 +168,12 @@ def circles(generator, robot):
 
 
 def shapes(generator, robot):
-    """One to five obstacles of any kind, half of them on springs."""
-    thinnest = _width(robot)
-    return _clear(
-        generator,
-        robot,
-        lambda: _planar_shape(generator, robot, thinnest, _spring(generator)),
-        int(generator.integers(1, 6)),
-    )
+    """Return one to five obstacles of any kind, half of them on springs."""
+    return _planar_shapes(generator, robot, lambda: _spring(generator), int(generator.integers(1, 6)))
 
 
 def crowd(generator, robot):
-    """Six to thirty-two small circles everywhere."""
+    """Return six to thirty-two small circles everywhere."""
 
     def sample():
         return Circle(center=tuple(_ahead(generator, 9, 110)), radius=_width(robot) * generator.uniform(1, 1.6))
@@ -188,7 +182,7 @@ def crowd(generator, robot):
 
 
 def narrow(generator, robot):
-    """Circles and capsules that are hardly wider than the points are apart, close to the robot."""
+    """Return circles and capsules barely wider than the distance between points, close to the robot."""
 
     def sample():
         radius = max(robot.edges_mm) * generator.uniform(0.5, 0.65)
@@ -201,7 +195,7 @@ def narrow(generator, robot):
 
 
 def channel(generator, robot):
-    """Two walls, or two rows of circles, with little room for the robot between them, now and then more ahead."""
+    """Return two walls, or two rows of circles, with little room between them, sometimes with more obstacles ahead."""
     room = generator.uniform(0.05, 6, 2)
     low, high = min(robot.lines_mm) - room[0], max(robot.lines_mm) + room[1]
     ahead = [Circle(center=tuple(_ahead(generator, 30, 60)), radius=_width(robot) + generator.uniform(0, 6))]
@@ -216,7 +210,7 @@ def channel(generator, robot):
 
 
 def sharp(generator, robot):
-    """Polygons with corners, and ellipses with ends, down to a millionth of the robot's length."""
+    """Return polygons with corners, and ellipses with ends, down to a millionth of the robot's length."""
 
     def sample():
         radius, size = robot.length_mm * 10 ** generator.uniform(-6, -1.3), generator.uniform(9, 20)
@@ -232,14 +226,12 @@ def sharp(generator, robot):
 
 
 def springs(generator, robot):
-    """One to four obstacles of any kind, all on springs, from a thread to a vice."""
-    thinnest = _width(robot)
-    return _clear(
-        generator,
-        robot,
-        lambda: _planar_shape(generator, robot, thinnest, _spring(generator, 1.0)),
-        int(generator.integers(1, 5)),
-    )
+    """Return one to four obstacles of any kind, all on springs, from very soft to very stiff."""
+    return _planar_shapes(generator, robot, lambda: _spring(generator, 1.0), int(generator.integers(1, 5)))
+
+
+def _planar_shapes(generator, robot, spring, count):
+    return _clear(generator, robot, lambda: _planar_shape(generator, _width(robot), spring()), count)
 
 
 PLANAR_KINDS = {sampler.__name__: sampler for sampler in (circles, shapes, crowd, narrow, channel, sharp, springs)}
@@ -249,7 +241,7 @@ PLANAR_KINDS = {sampler.__name__: sampler for sampler in (circles, shapes, crowd
 
 
 def _around(generator, low=20.0, high=80.0):
-    """A place around the robot."""
+    """Return a point around the robot."""
     azimuth, radius = generator.uniform(0, 2 * math.pi), generator.uniform(low, high)
     return np.array([radius * math.cos(azimuth), radius * math.sin(azimuth), generator.uniform(45, 185)])
 
@@ -276,7 +268,7 @@ def _spatial_shape(generator, robot, thinnest, spring, edge=None, low=20.0):
 
 
 def spheres(generator, robot):
-    """One to three large balls."""
+    """Return one to three large balls."""
 
     def sample():
         return spatial.Sphere(center=tuple(_around(generator, 35, 75)), radius=generator.uniform(10, 16))
@@ -285,12 +277,12 @@ def spheres(generator, robot):
 
 
 def spatial_shapes(generator, robot):
-    """One to five obstacles of any kind, half of them on springs."""
+    """Return one to five obstacles of any kind, half of them on springs."""
     return _spatial_shapes(generator, robot, lambda: _spring(generator), int(generator.integers(1, 6)))
 
 
 def spatial_springs(generator, robot):
-    """One to four obstacles of any kind, all on springs, from a thread to a vice."""
+    """Return one to four obstacles of any kind, all on springs, from very soft to very stiff."""
     return _spatial_shapes(generator, robot, lambda: _spring(generator, 1.0), int(generator.integers(1, 5)))
 
 
@@ -299,7 +291,7 @@ def _spatial_shapes(generator, robot, spring, count):
 
 
 def spatial_crowd(generator, robot):
-    """Six to thirty-two small balls all around."""
+    """Return six to thirty-two small balls all around."""
 
     def sample():
         return spatial.Sphere(
@@ -310,7 +302,7 @@ def spatial_crowd(generator, robot):
 
 
 def spatial_narrow(generator, robot):
-    """Balls that are hardly wider than the points are apart, close to the robot."""
+    """Return balls barely wider than the distance between points, close to the robot."""
 
     def sample():
         radius = max(robot.edges_mm) * generator.uniform(0.5, 0.65)
@@ -320,7 +312,7 @@ def spatial_narrow(generator, robot):
 
 
 def spatial_channel(generator, robot):
-    """Walls on up to four sides, or rings of balls, with little room for the robot between them."""
+    """Return walls on up to four sides, or rings of balls, with little room for the robot between them."""
     room = generator.uniform(0.05, 5, 4)
     sides = [np.array(side, float) for side in ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))]
     if generator.random() < 0.4:
@@ -336,7 +328,7 @@ def spatial_channel(generator, robot):
 
 
 def spatial_sharp(generator, robot):
-    """Boxes and cylinders with edges down to a millionth of the robot's length."""
+    """Return boxes and cylinders with edges down to a millionth of the robot's length."""
 
     def sample():
         edge = robot.length_mm * 10 ** generator.uniform(-6, -1.5)

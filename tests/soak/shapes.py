@@ -9,7 +9,7 @@ from solver import Capsule, Circle, Custom, Ellipse, HalfPlane, Obstacle, Polygo
 
 @singledispatch
 def distance(obstacle: Obstacle, points):
-    """Signed distance; of an Ellipse or Custom shape exact in sign, and to first order near the outline."""
+    """Return the signed distance; for Ellipse and Custom exact in sign, and of first order near the outline."""
     raise TypeError(f"no distance to {obstacle!r}")
 
 
@@ -75,7 +75,7 @@ def _(obstacle: spatial.Box, points):
 
 
 def depth(obstacle, points):
-    """How deep points are inside, at most: of curved outlines without a closed form by a polygon inside them."""
+    """Return the depth of points inside; for outlines without a closed form that of an inscribed polygon."""
     if not isinstance(obstacle, Ellipse | Custom):
         return -distance(obstacle, points)
     outline = obstacle.outline()

@@ -1,4 +1,4 @@
-"""Random walks: manners of pulling, releasing and inserting, and the states that they lead to."""
+"""Random walks: ways to pull, release and insert, and the states they lead to."""
 
 from typing import NamedTuple
 
@@ -8,14 +8,14 @@ from solver import Robot
 
 
 class Walk(NamedTuple):
-    """What was commanded, and what came of it."""
+    """Commands of a walk and its states."""
 
     states: list
     commands: np.ndarray  # (T, cables + 1) [mm], the length last
 
 
 def walk(solver, increments):
-    """Move by increments ``(T, cables + 1)`` of what the robot has reached, kept in range."""
+    """Walk by increments ``(T, cables + 1)`` on what the robot has reached, clipped to its range."""
     states, commands = [solver.rest()], []
     for increment in increments:
         commands.append(_in_range(solver.robot, command_of(states[-1]) + increment))
@@ -24,7 +24,7 @@ def walk(solver, increments):
 
 
 def replay(solver, commands):
-    """Follow commands ``(T, cables + 1)`` from rest."""
+    """Return the walk of commands ``(T, cables + 1)`` from rest."""
     states = [solver.rest()]
     for command in commands:
         states.append(step(solver, states[-1], command))
@@ -32,14 +32,14 @@ def replay(solver, commands):
 
 
 def step(solver, state, command):
-    """One step to a command (cables, length)."""
+    """Return the equilibrium after one step to a command (cables, length)."""
     if isinstance(solver.robot, Robot):
         return solver.step(state, float(command[0]), float(command[1]))
     return solver.step(state, command[:2])
 
 
 def command_of(state):
-    """Where a state's cables and base are, ``(cables + 1,)`` [mm]."""
+    """Return the present cable displacements and length of a state, ``(cables + 1,)`` [mm]."""
     cables = [state.cable_mm] if isinstance(state.robot, Robot) else state.cables_mm
     return np.array([*cables, state.length_mm])
 
@@ -51,7 +51,7 @@ def _in_range(robot, command):
 
 
 def sample_increments(generator, solver, scale, steps):
-    """Increments of cables and length, some manners of moving one after the other, ``(steps, cables + 1)`` [mm]."""
+    """Return increments of cables and length, in several ways of moving in turn, ``(steps, cables + 1)`` [mm]."""
     rows, calm = [], generator.random() < 0.6
     while len(rows) < steps:
         count, sizes = int(generator.integers(3, 31)), _sizes(generator, calm)
@@ -62,9 +62,9 @@ def sample_increments(generator, solver, scale, steps):
 
 
 def _sizes(generator, calm):
-    """A manner of moving the cables, in a calm episode only by little [mm]."""
+    """Return a way of moving the cables, in a calm episode only in small steps [mm]."""
     pull = generator.uniform(0.05, 1.0)
-    manners = [
+    ways = [
         lambda: generator.normal(0.05, 0.3),
         lambda: pull,
         lambda: pull * generator.uniform(0, 2),
@@ -74,11 +74,11 @@ def _sizes(generator, calm):
         lambda: generator.choice([-0.7, 1.0]) * generator.uniform(5, 11),
     ]
     weights = np.array([3, 5, 3, 3, 1, 1, 0 if calm else 5])
-    return manners[generator.choice(len(manners), p=weights / weights.sum())]
+    return ways[generator.choice(len(ways), p=weights / weights.sum())]
 
 
 def _direction(generator, solver):
-    """Of the cables; in space mostly towards an obstacle."""
+    """Return the direction of the cables, in space mostly towards an obstacle."""
     if isinstance(solver.robot, Robot):
         return np.ones(1)
     if generator.random() < 0.3 or not len(solver.scene):

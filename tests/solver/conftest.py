@@ -1,4 +1,4 @@
-"""Helpers of the solver's tests, as fixtures: test folders are not packages."""
+"""Helpers of the solver's tests, as fixtures, since test folders are not packages."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -15,13 +15,13 @@ def make_circles(*circles: tuple[float, float, float]) -> Scene:
 
 
 def cable_points(poses: np.ndarray, offset: float) -> np.ndarray:
-    """(..., 3) → (..., 2) [mm]."""
+    """Return the cable points of poses, (..., 3) → (..., 2) [mm]."""
     angle = poses[..., 2]
     return poses[..., :2] + offset * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def inside(points: np.ndarray, polygons: np.ndarray) -> np.ndarray:
-    """Even-odd rule: points (m, 2), polygons (..., k, 2) → (..., m) bool."""
+    """Return which points lie inside polygons by the even-odd rule, (m, 2), (..., k, 2) → (..., m) bool."""
     start, end = polygons[..., None, :, :], np.roll(polygons, -1, axis=-2)[..., None, :, :]
     x, y = points[:, None, 0], points[:, None, 1]
     above, rise = start[..., 1] > y, end[..., 1] - start[..., 1]
@@ -31,7 +31,7 @@ def inside(points: np.ndarray, polygons: np.ndarray) -> np.ndarray:
 
 
 def swept_centres(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
-    """Whether the centre of a fixed obstacle lies in what the backbone or the cable sweeps between consecutive shapes.
+    """Return whether backbone or cable swept over the centre of a fixed obstacle between consecutive shapes.
 
     Args:
         shapes: Node poses (k, n+1, 3).
@@ -54,7 +54,7 @@ def _still_disc(obstacle: Obstacle) -> bool:
 
 
 def clearance(shapes: np.ndarray, robot: Robot, scene: Scene) -> np.ndarray:
-    """Smallest gap of each shape to the obstacles of a scene that every node meets, (k,) [mm]."""
+    """Return the smallest gap of each shape to the obstacles that every node can touch, (k,) [mm]."""
     points = np.concatenate([shapes[..., :2], cable_points(shapes, robot.offset_mm)], axis=1)
     return np.min([obstacle.gap(points) for obstacle in scene if obstacle.nodes is None], axis=(0, 2))
 
@@ -63,12 +63,12 @@ OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] 
 
 
 def random_spring(generator: np.random.Generator) -> float | None:
-    """None for half of the obstacles, from very soft to very stiff for the others [N/mm]."""
+    """Return None for half of the obstacles, a stiffness from very soft to very stiff for the others [N/mm]."""
     return 10 ** generator.uniform(-2.5, 1.5) if generator.random() < 0.5 else None
 
 
 def random_shape(generator: np.random.Generator) -> Obstacle:
-    """Any kind of obstacle in front of the robot."""
+    """Return an obstacle of any kind in front of the robot."""
     x, y = generator.uniform((40, 75), (75, 150))
     axis, across, along = generator.normal(size=2), generator.uniform(6, 12), generator.uniform(6, 20)
     axis /= np.linalg.norm(axis)
@@ -93,7 +93,7 @@ def random_shape(generator: np.random.Generator) -> Obstacle:
 
 
 def random_shapes(generator: np.random.Generator, robot: Robot) -> Scene:
-    """One to four obstacles of any kind, fixed or on springs, with a core, that leave the unactuated robot free."""
+    """Return one to four obstacles of any kind, fixed or on springs, with a core, clear of the straight robot."""
     while True:
         shapes = [random_shape(generator) for _ in range(generator.integers(1, 5))]
         scene = Scene(replace(shape, spring=random_spring(generator)) for shape in shapes)

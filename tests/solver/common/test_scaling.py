@@ -55,7 +55,7 @@ def test_other_scales_give_the_same_robot(model, s, episodes):
         for k, (state, large) in enumerate(zip(taken.states, scaled(solver, taken.commands, s), strict=True)):
             assert large.status.name == state.status.name, (index, k)
             expected, found = natural(state), natural(large, s)
-            for name, unit in (("places", length), ("forces", 1.0), ("tension", 1.0), ("tensions", 1.0)):
+            for name, unit in (("points", length), ("forces", 1.0), ("tension", 1.0), ("tensions", 1.0)):
                 if name in found:
                     np.testing.assert_allclose(
                         found[name], expected[name], rtol=CLOSE, atol=CLOSE * unit, err_msg=f"{name} {index} {k}"

@@ -18,8 +18,8 @@ EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
 def circles(generator, count):
-    drawn = generator.uniform((38, 75, 10), (75, 150, 16), (count, 3)).tolist()
-    return [Circle(center=(x, y), radius=r, spring=0.5 if k % 3 == 0 else None) for k, (x, y, r) in enumerate(drawn)]
+    sampled = generator.uniform((38, 75, 10), (75, 150, 16), (count, 3)).tolist()
+    return [Circle(center=(x, y), radius=r, spring=0.5 if k % 3 == 0 else None) for k, (x, y, r) in enumerate(sampled)]
 
 
 @EVERY_MODEL
@@ -267,7 +267,7 @@ def test_robots_whose_rest_was_cut_short_do_not_move_until_they_rest(monkeypatch
         with pytest.raises(KeyboardInterrupt):
             batch.rest([1])
     for use in (lambda: batch.move(1), lambda: batch.equilibrium(1), lambda: batch.step(np.full(3, 9.5))):
-        with pytest.raises(ValueError, match=r"its rest was cut short; call rest\(\[1\]\) before it moves"):
+        with pytest.raises(ValueError, match=r"its rest was interrupted; call rest\(\[1\]\) before it moves"):
             use()
     batch.rest([1])
     batch.step(np.full(3, 9.0))

@@ -159,9 +159,9 @@ def test_far_obstacles_change_nothing(circles):
 
 
 @pytest.mark.parametrize("touch", [("backbone", "cable"), ("backbone", "cable", "rim")])
-@pytest.mark.parametrize("place", [(30, 120), (45, 150), (60, 110), (24, 70)])
-def test_a_thin_peg_does_not_slip_between_nodes(place, touch, circles, pulls, swept):
-    peg = circles((*place, 0.5))
+@pytest.mark.parametrize("center", [(30, 120), (45, 150), (60, 110), (24, 70)])
+def test_a_thin_peg_does_not_slip_between_nodes(center, touch, circles, pulls, swept):
+    peg = circles((*center, 0.5))
     coarse = {"length_mm": 180.0, "segments": 10, "offset_mm": 8.0, "touch": touch}
     with pytest.raises(ValueError, match=r"radius 0.5 mm; it could slip between points .* between=(18|27) or more"):
         Solver(Robot(**coarse), peg)

@@ -180,11 +180,11 @@ def test_a_family_from_elsewhere_loads_no_library(tmp_path):
     (tmp_path / "planted.c").write_text(LIBRARY.replace("WITNESS", str(witness)))
     subprocess.run(["cc", "-shared", "-fPIC", str(tmp_path / "planted.c"), "-o", str(library)], check=True)
     external = "import casadi, sys; print(casadi.external('planted', sys.argv[1]).serialize(), end='')"
-    told = subprocess.run([sys.executable, "-c", external, str(library)], capture_output=True, text=True, check=True)
+    listed = subprocess.run([sys.executable, "-c", external, str(library)], capture_output=True, text=True, check=True)
     witness.unlink()
     refused = "import sys; from solver import Family; Family(sys.argv[1]).function"
-    run = subprocess.run([sys.executable, "-c", refused, told.stdout], capture_output=True, text=True)
-    assert "families are made by Family.trace" in run.stderr
+    run = subprocess.run([sys.executable, "-c", refused, listed.stdout], capture_output=True, text=True)
+    assert "make families by Family.trace" in run.stderr
     assert not witness.exists()
 
 
@@ -196,10 +196,10 @@ def test_a_family_is_rebuilt_from_its_text():
         )
 
     point, sizes = ca.SX.sym("point", 2), ca.SX.sym("sizes", 2)
-    told = ca.Function("told", [point, sizes], [function(point, sizes)])
+    traced = ca.Function("traced", [point, sizes], [function(point, sizes)])
     points = np.random.default_rng(0).uniform(-3, 3, (2, 100))
     again = Family(Family.trace(function, sizes=2).text)
-    ours, theirs = (np.asarray(function(points, [2.0, 0.7])) for function in (again.function, told))
+    ours, theirs = (np.asarray(function(points, [2.0, 0.7])) for function in (again.function, traced))
     assert np.array_equal(ours, theirs, equal_nan=True)
 
 
@@ -218,7 +218,7 @@ def test_a_family_is_rebuilt_from_its_text():
     ],
 )
 def test_a_text_that_is_no_family_is_refused(text):
-    with pytest.raises(ValueError, match="families are made by"):
+    with pytest.raises(ValueError, match="make families by"):
         Family(text)
 
 

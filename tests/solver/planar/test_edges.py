@@ -141,7 +141,7 @@ def test_a_snake_arm_slips_off_its_circle_whatever_its_size(s, increment):
     assert states[-1].nodes[-1, :2] / s == pytest.approx((592.93092, 703.90134), abs=1e-3)
 
 
-# The tension never passes its limit, at no place of a step.
+# The tension never exceeds its limit, at any point of a step.
 
 
 @pytest.mark.parametrize("increment", [0.02, 0.1, 0.5, 1.5, 9.5])

@@ -1,6 +1,6 @@
-"""The sliding cable against the rod it discretises: an elastica with a frictionless cable, held off by a wall.
+"""The rod model against the elastica it discretises: a beam with a frictionless cable, pressed by a wall.
 
-With the bending angle θ = −φ, the curvature κ = θ' and the wall's force (−N, 0) at arc length s_c, the rod obeys
+With the bending angle θ = −φ, the curvature κ = θ' and the wall's force (−N, 0) at arc length s_c, the beam obeys
 EI κ = T a − N (y(s_c) − y) below s_c and EI κ = T a beyond; x(s_c) = d and a θ(L) = l fix T and N.
 """
 

@@ -50,9 +50,9 @@ def test_a_copied_equilibrium_is_read_only(circles, copied):
 def test_an_equilibrium_keeps_no_array_that_others_write(circles):
     equilibrium = Solver(Robot.prototype(), circles((44, 104, 15))).rest()
     rows = np.array([equilibrium.block, equilibrium.block])
-    held = Equilibrium(equilibrium.robot, equilibrium.scene, rows[0], Status.CONVERGED, 0)
+    kept = Equilibrium(equilibrium.robot, equilibrium.scene, rows[0], Status.CONVERGED, 0)
     rows[:] = 7.0
-    assert held.block.tobytes() == equilibrium.block.tobytes()
+    assert kept.block.tobytes() == equilibrium.block.tobytes()
 
 
 def test_an_equilibrium_is_shown_in_short(circles):
@@ -62,9 +62,9 @@ def test_an_equilibrium_is_shown_in_short(circles):
     assert "<Equilibrium CONVERGED: 18 segments, 180 mm long, 1 obstacles, 1 contacts, cable 7 mm" in text
 
 
-def written(place, value):
+def written(index, value):
     def change(block):
-        block[place] = value
+        block[index] = value
         return block
 
     return change

@@ -53,23 +53,25 @@ def test_work_of_tension_and_contact_is_the_change_of_energy(model, scene):
     _, equilibrium = pulled(scene, 9.0, model=model)
     robot, n = equilibrium.robot, equilibrium.robot.segments
     unknowns, parameters, _, _ = equilibrium.node_solution()
-    slope, _, held, _, gaps = (
+    slope, _, equality_slopes, _, gaps = (
         v.full() for v in node_derivatives(robot, scene.laws, scene.mounted)(unknowns, parameters)
     )
     # Admissible: backbone and disks keep their lengths; the cable shortens, by 1/n in each segment or as a whole.
     shortening = np.zeros(3 * n)
     if model == "rod":
-        held, gaps, shortening = (
-            np.vstack([held, gaps[:1]]),
+        equality_slopes, gaps, shortening = (
+            np.vstack([equality_slopes, gaps[:1]]),
             gaps[robot_inequality_count(robot) :],
             np.r_[shortening, 1.0],
         )
     else:
         shortening[n : 2 * n] = -1.0 / n
-    null = np.linalg.svd(held)[2][len(held) :]
+    null = np.linalg.svd(equality_slopes)[2][len(equality_slopes) :]
     generator = np.random.default_rng(0)
     for _ in range(10):
-        direction = np.linalg.lstsq(held, shortening, rcond=None)[0] + generator.normal(size=len(null)) @ null
+        direction = (
+            np.linalg.lstsq(equality_slopes, shortening, rcond=None)[0] + generator.normal(size=len(null)) @ null
+        )
         work = equilibrium.energy_scale * float(equilibrium.multipliers[:, :, 1:].ravel() @ (gaps @ direction))
         change = equilibrium.energy_scale * float(slope.ravel() @ direction)
         assert change == pytest.approx(equilibrium.tension + work, abs=1e-8)

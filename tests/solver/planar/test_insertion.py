@@ -1,4 +1,4 @@
-"""Insertion, and the sliding cable: what a robot meets ahead, slack, and what stops it."""
+"""Insertion of both models, and the slack cable of the rod."""
 
 from dataclasses import replace
 
@@ -61,12 +61,12 @@ def test_cable_goes_slack_where_the_wall_bends_the_robot_more():
 
 def test_cable_holds_where_the_wall_bends_the_robot_the_other_way():
     solver = Solver(robot_with("rod", max_tension=3.0), Scene([HalfPlane(point=(0, 150), normal=(-0.3, -1))]))
-    held = inserted(solver, (0.0, 148), (0.0, 180))
-    assert held.status is Status.STALLED
-    assert held.tension == pytest.approx(3.0, rel=1e-6)
-    assert held.tension <= 3.0
-    assert 148 < held.length_mm < 180
-    assert solver.step(held, 0.0, 148).status is Status.CONVERGED
+    stalled = inserted(solver, (0.0, 148), (0.0, 180))
+    assert stalled.status is Status.STALLED
+    assert stalled.tension == pytest.approx(3.0, rel=1e-6)
+    assert stalled.tension <= 3.0
+    assert 148 < stalled.length_mm < 180
+    assert solver.step(stalled, 0.0, 148).status is Status.CONVERGED
 
 
 @EVERY_MODEL

@@ -87,24 +87,24 @@ def moved(obstacle, x=0.0, y=0.0, turn=0.0, growth=0.0):
         np.array(obstacle.extent.center),
         np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]),
     )
-    place = lambda point: tuple(centre + rotation @ (np.array(point) - centre) + (x, y))  # noqa: E731
+    move = lambda point: tuple(centre + rotation @ (np.array(point) - centre) + (x, y))  # noqa: E731
     match obstacle:
         case Circle():
-            return replace(obstacle, center=place(obstacle.center), radius=obstacle.radius + growth)
+            return replace(obstacle, center=move(obstacle.center), radius=obstacle.radius + growth)
         case Ellipse():
             radii, axis = tuple(np.array(obstacle.radii) + growth), tuple(rotation @ obstacle.axis)
-            return replace(obstacle, center=place(obstacle.center), radii=radii, axis=axis)
+            return replace(obstacle, center=move(obstacle.center), radii=radii, axis=axis)
         case Capsule():
-            ends = {"start": place(obstacle.start), "end": place(obstacle.end)}
+            ends = {"start": move(obstacle.start), "end": move(obstacle.end)}
             return replace(obstacle, **ends, radius=obstacle.radius + growth)
         case Polygon():
-            return replace(obstacle, corners=tuple(map(place, obstacle.corners)), radius=obstacle.radius + growth)
+            return replace(obstacle, corners=tuple(map(move, obstacle.corners)), radius=obstacle.radius + growth)
         case Custom():
             assert growth == 0
-            return replace(obstacle, center=place(obstacle.center), axis=tuple(rotation @ obstacle.axis))
+            return replace(obstacle, center=move(obstacle.center), axis=tuple(rotation @ obstacle.axis))
         case HalfPlane():
             normal = rotation @ obstacle.normal
-            return replace(obstacle, point=tuple(place(obstacle.point) + growth * normal), normal=tuple(normal))
+            return replace(obstacle, point=tuple(move(obstacle.point) + growth * normal), normal=tuple(normal))
 
 
 def compare(slopes, row, ahead, behind):

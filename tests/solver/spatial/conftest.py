@@ -1,4 +1,4 @@
-"""Scenes of space that tests draw, and vectors turned about the base axis."""
+"""Helpers of the spatial solver's tests: sampled scenes and walks, and rotations about the base axis."""
 
 import math
 
@@ -10,13 +10,13 @@ from solver.spatial import Box, Capsule, Cylinder, HalfSpace, SpatialRobot, Spat
 
 
 def turned(vectors, angle):
-    """Vectors (..., 3) turned about the base axis."""
+    """Return vectors (..., 3) turned about the base axis."""
     cosine, sine = math.cos(angle), math.sin(angle)
     return np.asarray(vectors) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
 
 
 def random_shape(generator):
-    """An obstacle of any kind around the robot, now and then on a spring."""
+    """Return an obstacle of any kind around the robot, sometimes on a spring."""
     azimuth, radius = generator.uniform(0, 2 * math.pi), generator.uniform(10, 16)
     outward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     center = generator.uniform(35, 75) * outward + [0.0, 0.0, generator.uniform(75, 150)]
@@ -39,7 +39,7 @@ def random_shape(generator):
 
 
 def random_solver(generator, robot):
-    """A robot among one to three obstacles that leave it free at rest."""
+    """Return the solver of a robot among one to three obstacles that are clear of it at rest."""
     while True:
         try:
             return SpatialSolver(robot, Scene(random_shape(generator) for _ in range(generator.integers(1, 4))))
@@ -48,7 +48,7 @@ def random_solver(generator, robot):
 
 
 def random_walk(generator, solver, steps):
-    """Increments of both cables at random, drawn towards an obstacle, or anywhere, for fifty steps at a time."""
+    """Return the states of a random walk of both cables, towards an obstacle, or anywhere, for fifty steps each."""
     states, limit = [solver.rest()], solver.robot.cable_limit_mm
     for k in range(steps):
         if k % 50 == 0:
@@ -82,7 +82,7 @@ def random_walk_fixture():
 
 @pytest.fixture(scope="session", name="walk")
 def walk_fixture():
-    """Follow commands one after the other."""
+    """Return a function that follows commands one after the other."""
 
     def walk(solver, commands):
         equilibrium = solver.rest()

@@ -58,7 +58,7 @@ def moved(obstacle, shift=(0, 0, 0), axis=0, turn=0.0, growth=0.0):
     rotation[[a, a, b, b], [a, b, a, b]] = cosine, -sine, sine, cosine
     centre = np.array(obstacle.extent.center)
     place = lambda point: centre + rotation @ (np.array(point) - centre) + shift  # noqa: E731
-    places = {name: place(getattr(obstacle, name)) for name in obstacle.places}
+    places = {name: place(getattr(obstacle, name)) for name in obstacle.point_fields}
     match obstacle:
         case Sphere() | Capsule():
             return replace(obstacle, **places, radius=obstacle.radius + growth)
