@@ -136,7 +136,7 @@ class LearnedPolicy:
         if shapes != self._shapes:
             trained = f"{self.training.config.env_id} with {self.training.config.sensing} sensing"
             raise ValueError(
-                f"the observation has the shapes {shapes}; those of {trained}, which the policy was trained with, are "
+                f"the observation has the shapes {shapes}; the policy was trained on {trained}, whose observation has "
                 f"{self._shapes}"
             )
         rows = {key: value[None] for key, value in observation.items()}
