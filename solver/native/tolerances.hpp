@@ -92,9 +92,9 @@ inline constexpr int kStallIterations = 40;
 inline constexpr double kCommandResolution = 1.25e-12;  // smallest difference of commands [a]
 
 // Feasible descent after a branch end.
-inline constexpr double kFenceShear =
+inline constexpr double kBarrierShear =
     0.95;  // squared shear, over that of a segment that folds over, where the barrier begins
-inline constexpr double kFence = 10.0;  // curvature of the barrier [rad²]
+inline constexpr double kBarrierCurvature = 10.0;  // curvature of the barrier [rad²]
 inline constexpr int kDescentIterations = 300;
 inline constexpr int kFinishEvery = 8;       // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;  // largest step of one iterate

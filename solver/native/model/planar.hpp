@@ -72,9 +72,8 @@ class Planar {
 
   double slack(const Command<1>& command) const requires(kRod) { return states.back()[kState - 1] - command.cables[0]; }
   DiskGap disk_gap(int segment, int side) const requires(kRod);  // side 1 is that of the cable, -1 the other
-  double widest_shear() const {
-    return kRod ? HUGE_VAL : 1 - displacement_ / length_;
-  }  // its sine, of a segment that folds over
+  // Sine of the shear angle at which a segment folds over.
+  double widest_shear() const { return kRod ? HUGE_VAL : 1 - displacement_ / length_; }
   double free_turn() const { return displacement_ / robot_.offset; }  // approximate angle of a free segment
   double segment_length() const { return length_; }
 

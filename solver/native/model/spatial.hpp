@@ -76,8 +76,9 @@ class Spatial {
 
   Vec<kTip> free_slopes(const Command<2>& command) const;
 
-  double widest_shear() const { return 1; }  // its sine, of a segment that folds over
-  double free_turn() const;                  // approximate angle of a free segment
+  // Sine of the shear angle at which a segment folds over.
+  double widest_shear() const { return 1; }
+  double free_turn() const;  // approximate angle of a free segment
   double segment_length() const { return inputs_.length; }
 
   std::vector<State> states;

@@ -47,8 +47,8 @@ template <class Model>
 bool ContactProblem<Model>::evaluate(const Iterate& at) {
   if (!model_.evaluate(at.command, at.controls)) return false;
   update_springs(at.mounts);
-  fence_energy_ = 0;
-  if (fenced_) raise_fence(at.controls);
+  barrier_energy_ = 0;
+  if (barrier_enabled_) add_barrier(at.controls);
   for (int i = 0; i <= robot_.segments; ++i)
     for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
   place_points<Model>(robot_, nodes_, frames(), points_);
@@ -57,27 +57,28 @@ bool ContactProblem<Model>::evaluate(const Iterate& at) {
   return true;
 }
 
-// The barrier is kFence/2 · max(0, s - kFenceShear)², s the squared shear over that of a segment that folds over.
+// The barrier is kBarrierCurvature/2 · max(0, s - kBarrierShear)², s the squared shear over that of a segment that
+// folds over.
 template <class Model>
-void ContactProblem<Model>::raise_fence(const std::vector<Control>& controls) {
-  fence_slope_.assign(controls.size(), {});
-  fence_curvature_.assign(controls.size(), {});
+void ContactProblem<Model>::add_barrier(const std::vector<Control>& controls) {
+  barrier_slope_.assign(controls.size(), {});
+  barrier_curvature_.assign(controls.size(), {});
   const double square = model_.widest_shear() * model_.widest_shear();
   for (std::size_t i = 0; i < controls.size(); ++i) {
     double shear = 0;
     for (int k = 0; k < Model::kShears; ++k) shear += controls[i][k] * controls[i][k];
-    const double excess = shear / square - tolerances::kFenceShear;
+    const double excess = shear / square - tolerances::kBarrierShear;
     if (excess <= 0) continue;
-    fence_energy_ += tolerances::kFence * excess * excess / 2;
-    const double rise = 2 * tolerances::kFence / square;
+    barrier_energy_ += tolerances::kBarrierCurvature * excess * excess / 2;
+    const double rise = 2 * tolerances::kBarrierCurvature / square;
     for (int r = 0; r < Model::kShears; ++r) {
-      fence_slope_[i][r] = rise * excess * controls[i][r];
-      fence_curvature_[i](r, r) = rise * excess;
+      barrier_slope_[i][r] = rise * excess * controls[i][r];
+      barrier_curvature_[i](r, r) = rise * excess;
       for (int c = 0; c < Model::kShears; ++c)
-        fence_curvature_[i](r, c) += 2 * rise / square * controls[i][r] * controls[i][c];
+        barrier_curvature_[i](r, c) += 2 * rise / square * controls[i][r] * controls[i][c];
     }
   }
-  energy_ += fence_energy_;
+  energy_ += barrier_energy_;
 }
 
 template <class Model>
@@ -197,15 +198,15 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
     }
   }
   model_.propagate_adjoints(node_forces_);
-  if (at_fence())
-    for (std::size_t i = 0; i < fence_slope_.size(); ++i) model_.gradient[i] += fence_slope_[i];
+  if (in_barrier())
+    for (std::size_t i = 0; i < barrier_slope_.size(); ++i) model_.gradient[i] += barrier_slope_[i];
 }
 
 template <class Model>
 void ContactProblem<Model>::lagrangian_hessian(const ActiveSet& active, System& system) const {
   model_.lagrangian_hessian(system);
-  if (at_fence())
-    for (std::size_t i = 0; i < fence_curvature_.size(); ++i) system.stages[i].huu += fence_curvature_[i];
+  if (in_barrier())
+    for (std::size_t i = 0; i < barrier_curvature_.size(); ++i) system.stages[i].huu += barrier_curvature_[i];
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     if constexpr (Model::kRod)

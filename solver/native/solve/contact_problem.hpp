@@ -87,10 +87,10 @@ class ContactProblem {
 
   // While `on`, adds a barrier energy to segments that come near to folding over, which no equilibrium of interest does
   // but a descent might.
-  void fence(bool on) { fenced_ = on; }
-  bool at_fence() const { return fence_energy_ > 0; }  // whether a segment of the last shape is in the barrier
+  void enable_barrier(bool on) { barrier_enabled_ = on; }
+  bool in_barrier() const { return barrier_energy_ > 0; }  // whether a segment of the last shape is in the barrier
 
-  // Sets the equilibrium of the robot that nothing touches, which is known in closed form.
+  // Sets the equilibrium of the robot that nothing touches, which is the same in all segments.
   void set_free_shape(Iterate& at);
 
   // Computes the gradient of the Lagrangian J - Σ λ c in controls and mounts.
@@ -153,7 +153,7 @@ class ContactProblem {
     return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]];
   }
   void add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod);
-  void raise_fence(const std::vector<Control>& controls);
+  void add_barrier(const std::vector<Control>& controls);
   void update_springs(const std::vector<Position>& mounts);
   void measure_gaps();
   void measure_slack_and_disks(const Command& command) requires(Model::kRod);
@@ -166,10 +166,10 @@ class ContactProblem {
   std::span<const Obstacle> obstacles_;
   double reach_ = 0;  // distance of a node from an obstacle within which its points are measured
   double energy_ = 0;
-  bool fenced_ = false;
-  double fence_energy_ = 0;
-  std::vector<Control> fence_slope_;  // of each segment
-  std::vector<Mat<Model::kControl, Model::kControl>> fence_curvature_;
+  bool barrier_enabled_ = false;
+  double barrier_energy_ = 0;
+  std::vector<Control> barrier_slope_;  // of each segment
+  std::vector<Mat<Model::kControl, Model::kControl>> barrier_curvature_;
   std::vector<Position> origin_;        // nodes of the shape of the broad phase
   std::vector<Position> mount_origin_;  // mounts of that shape
   std::vector<double> clear_;           // of each obstacle: motion of the nodes before it is within reach

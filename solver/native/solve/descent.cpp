@@ -19,14 +19,14 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   descent_mounts_ = mounts_;
   descent_trace_ = shapes_ ? shapes_->size() : 0;
   present_evaluated_ = false;
-  problem_.fence(true);
+  problem_.enable_barrier(true);
   bool moved = newton_.set_metric(present_) && leave_towards(command), folded = false;
   for (int i = 0; i < kDescentIterations && moved && !work_is_spent(); ++i) {
     std::swap(present_, trial_);
     record_shape();
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton();
     const bool ended = finished || descend_once(moved);
-    folded = !finished && problem_.at_fence();
+    folded = !finished && problem_.in_barrier();
     if (!ended) continue;
     if (folded && !try_newton()) break;
     return finish_descent(motor_holds);
@@ -37,7 +37,7 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
 
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool motor_holds) {
-  problem_.fence(false);
+  problem_.enable_barrier(false);
   present_evaluated_ = false;
   clear_trend();
   evaluate_present();
@@ -53,7 +53,7 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
 
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::undo_descent(End end) {
-  problem_.fence(false);
+  problem_.enable_barrier(false);
   present_ = descent_start_;
   points_ = descent_points_;
   mounts_ = descent_mounts_;
@@ -104,9 +104,9 @@ template <class Model>
 bool ModelContinuation<Model>::try_newton() {
   const double energy = problem_.energy();
   trial_ = present_;
-  problem_.fence(false);
+  problem_.enable_barrier(false);
   const NewtonResult found = newton_.solve(trial_, 0);
-  problem_.fence(true);
+  problem_.enable_barrier(true);
   result_.iterations += found.iterations;
   if (!found.converged || problem_.energy() > energy || !trial_is_close()) return false;
   std::swap(present_, trial_);
