@@ -1,5 +1,6 @@
 """The commands of ``ccr-gym``; each imports what it needs when it runs."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import tyro
@@ -40,14 +41,14 @@ def run() -> None:
             reproduce(config)
 
 
-def parse() -> Command:
-    """Return the command and its settings from the command line.
+def parse(arguments: Sequence[str] | None = None) -> Command:
+    """Return the command and its settings from arguments, by default those of the process.
 
     Raises:
         SystemExit: If it asks for help or has an error, after printing either.
     """
     settings = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes)
-    command: Command = tyro.cli(Command, prog="ccr-gym", config=settings)
+    command: Command = tyro.cli(Command, prog="ccr-gym", args=arguments, config=settings)
     return command
 
 

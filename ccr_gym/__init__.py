@@ -1,10 +1,11 @@
 """Gymnasium environments for contact-aware control of a cable-driven continuum robot; importing it registers them."""
 
-from ccr_gym.imports import check_kernel, check_packages
+from ccr_gym.imports import check_kernel, check_packages, warn_of_foreign_agents
 
 # ruff: noqa: E402 - the checks come before what they check
 check_packages("solver")
 check_kernel()
+warn_of_foreign_agents()
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.contact_env import ContactEnv

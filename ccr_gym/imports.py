@@ -2,6 +2,7 @@
 
 import importlib
 import importlib.util
+import warnings
 from importlib.machinery import ModuleSpec
 
 MARKER = 'PART_OF = "ccr-gym"'  # in the __init__.py of solver and agents
@@ -24,6 +25,16 @@ def check_packages(*names: str) -> None:
                 "one and reinstall ccr-gym, or install ccr-gym in an environment of its own",
                 name=name,
             )
+
+
+def warn_of_foreign_agents() -> None:
+    """Warn in one line if another package is named agents; the environments themselves do without ours."""
+    if importlib.util.find_spec("agents") is None:
+        return
+    try:
+        check_packages("agents")
+    except ImportError as error:
+        warnings.warn(str(error), stacklevel=3)
 
 
 def check_kernel() -> None:

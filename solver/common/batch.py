@@ -322,8 +322,6 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
 
     def _check_rested(self, robots: list[int]) -> None:
         """Check that robots were brought to rest in their scenes."""
-        if not self._unrested:
-            return
         for robot in self._unrested.intersection(robots):
             self.scene(robot)
             raise ValueError(
