@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -126,10 +125,16 @@ def test_an_interrupt_ends_a_command_in_one_line_and_leaves_no_process(name, sec
     assert not list(tmp_path.rglob(f"{PARTIAL}*"))
 
 
-@pytest.mark.parametrize("package", ["agents", "solver"])
-def test_another_projects_package_is_named(package, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, package, SimpleNamespace(__file__="site-packages/theirs.py", __all__=["Agent"]))
-    assert_one_line(*called(monkeypatch, capsys, "bench"), repr(package), "site-packages/theirs.py", "pip install")
+def test_another_projects_solver_is_named(tmp_path):
+    (tmp_path / "solver.py").write_text("raise SystemExit('imported')")
+    root = Path(cli.__file__).parents[1]
+    code = "import sys; from agents.cli import main; sys.argv = ['ccr-gym', 'bench']; main()"
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, cwd=tmp_path)
+    assert ran.returncode == cli.FAILED
+    assert_one_line(
+        ran.returncode, ran.stderr.splitlines(), "'solver'", str(tmp_path / "solver.py"), "environment of its own"
+    )
 
 
 def test_help_loads_no_learning_library():
