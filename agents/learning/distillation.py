@@ -27,6 +27,7 @@ from agents.learning.checkpoint import (
     restore_statistics,
     statistics_tensors,
 )
+from agents.learning.checks import Form, check_tensors, moment_forms
 from agents.learning.learners import make_envs
 from agents.learning.network import EPSILON, Network, normalized, standard_deviation
 from agents.policy import motor_actions, search
@@ -112,8 +113,10 @@ class Imitation:
         """Restore a state of :meth:`state`.
 
         Raises:
-            Exception: Of any kind, if the state is that of another learner.
+            Exception: Of any kind, if the state is that of another learner or damaged; nothing is then changed.
         """
+        forms = {name: Form.of(tensor) for name, tensor in self.state(steps).tensors.items()}
+        check_tensors(state.tensors, forms | moment_forms("adam", self.adam))
         states = {"network": self.student.network.state_dict(), "adam": self.adam.state_dict()}
         nested = nest_states(state.tensors, states)
         self.student.network.load_state_dict(nested["network"])
