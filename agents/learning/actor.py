@@ -91,6 +91,7 @@ class LearnedPolicy:
         path: File of the policy, or the folder of the run that trained it.
 
     Attributes:
+        path: Its file.
         name: Name of the learner.
         training: How it was trained.
 
@@ -100,7 +101,7 @@ class LearnedPolicy:
     """
 
     def __init__(self, path: Path) -> None:
-        path = path if path.suffix == SUFFIX else path / ACTOR
+        self.path = path = path if path.suffix == SUFFIX else path / ACTOR
         if path.is_dir():
             raise UserError(f"{path} is a folder; a trained policy is a file: move it away, and train again")
         if not path.is_file():
