@@ -6,7 +6,6 @@ prediction to no-regret online learning" (DAgger), AISTATS 2011. What the histor
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -29,6 +28,7 @@ from agents.learning.checkpoint import (
 )
 from agents.learning.checks import Form, check_tensors, moment_forms
 from agents.learning.learners import make_envs
+from agents.learning.log import recording
 from agents.learning.network import EPSILON, Network, normalized, standard_deviation
 from agents.policy import motor_actions, search
 from agents.tuned import DistilledSettings
@@ -173,7 +173,7 @@ class Rollouts:
             self.rows = rows
 
 
-def distill(run: TrainingRun, settings: DistilledSettings, log: Path, progress: bool) -> tuple[Network, RunningMeanStd]:
+def distill(run: TrainingRun, settings: DistilledSettings, progress: bool) -> tuple[Network, RunningMeanStd]:
     """Train a student to the end of a run; return its network and the statistics that its rows are normalised by."""
     torch.manual_seed(run.config.seed)
     envs = make_envs(run.config, settings.envs, run.seed)
@@ -186,7 +186,9 @@ def distill(run: TrainingRun, settings: DistilledSettings, log: Path, progress: 
     rows, generator = envs.reset(), np.random.default_rng(run.seed)
     assert isinstance(rows, np.ndarray)
     rollouts, first = Rollouts(envs, rows, generator), run.progress.steps // imitation.count
-    with SummaryWriter(str(log)) as writer:
+    with recording(run.config.run) as log:
+        writer = SummaryWriter(str(log))
+    with writer:
         for done in track(range(first, imitation.rounds), "distil", disable=not progress):
             steps = (done + 1) * imitation.count
             rollouts.play(imitation, done)
