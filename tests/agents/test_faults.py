@@ -17,6 +17,7 @@ from agents.errors import UserError
 from agents.files import LOCK, PARTIAL, locked, replacing, write_text
 from agents.learning import checkpoint, training
 from agents.learning.actor import ACTOR, LearnedPolicy
+from agents.learning.log import OWN
 from agents.tuned import PPOSettings
 from agents.workers import worker_pool
 
@@ -155,7 +156,7 @@ def test_training_on_a_full_disk_goes_on_when_there_is_space(size, file, tmp_pat
     run = tmp_path / "run"
     code, lines = ended(started("train", "--run", run, *SMALL, preexec_fn=limited(size)))
     assert_one_line(code, lines, f"{run / file} cannot be written: File too large")
-    assert {path.name for path in run.iterdir()} <= {LOCK, "config.json", "log_1"}
+    assert {path.name for path in run.iterdir()} <= {LOCK, OWN, "config.json", "log_1"}
     assert ended(started("train", "--run", run, *SMALL)) == (0, [])
     assert LearnedPolicy(run).training.curve.returns
 
