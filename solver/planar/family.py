@@ -9,7 +9,7 @@ from typing import Self
 import casadi as ca
 
 from solver._kernel import SHAPE_SIZE
-from solver.common.validation import check_whole, shown
+from solver.common.validation import check_instance, check_whole, shown
 
 UNARY = (
     *("NEG", "EXP", "LOG", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "NOT", "FLOOR", "CEIL"),
@@ -36,11 +36,13 @@ class Family:
 
     Raises:
         ValueError: If the text is no such list.
+        TypeError: If it is no text.
     """
 
     text: str
 
     def __post_init__(self) -> None:
+        check_instance("text", self.text, str, "make families by Family.trace")
         _rebuild(self.text)
 
     @classmethod
