@@ -1,5 +1,6 @@
 """Obstacles of any smooth shape, given as CasADi expressions."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -17,14 +18,17 @@ from solver.common.validation import (
 )
 from solver.planar.family import POSE_SIZE, Family
 from solver.planar.obstacles import directions
-from solver.planar.outline import Flaw, Form, find_flaw, measure_outline, trace_outline
+from solver.planar.outline import Flaw, Form, find_distant_flaw, find_flaw, measure_outline, trace_outline
+
+ROBOT_REACH = 1.5  # farthest point of a robot from its base, over its longest length, with room for its offset
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Custom(Obstacle):
     """Any smooth shape that is star-shaped: its whole surface can be seen from its centre.
 
-    The solver compiles the gap with the machine's C compiler, once for each family; ``ReferenceSolver`` needs none.
+    The solver compiles the gap with the machine's C compiler, once for each family; ``ReferenceSolver`` needs none. It
+    refuses a shape whose gap is no number, or of the wrong sign, somewhere that points of its robot can be.
 
     Attributes:
         family: Family of the shape.
@@ -91,11 +95,21 @@ class Custom(Obstacle):
         """Return points of the surface, ``(k, 2)`` [mm]."""
         return self._placed(trace_outline(self._form))
 
-    def _refuse(self, flaw: Flaw | None) -> None:
+    def check_proportion(self, length_mm: float) -> None:
+        """Check also that the gap is of use wherever points of a robot of some length can be.
+
+        Raises:
+            ValueError: Naming the value and the bound, or the point and the remedy.
+        """
+        Obstacle.check_proportion(self, length_mm)
+        farthest = math.hypot(*self.center) + ROBOT_REACH * length_mm
+        self._refuse(find_distant_flaw(self._form, farthest, length_mm / 2), ", where points of the robot can be")
+
+    def _refuse(self, flaw: Flaw | None, where: str = " of the shape's outline") -> None:
         """Raise an error that names what is wrong at a point, if anything is."""
         if flaw is not None:
             x, y = self._placed(np.array(flaw.point)).tolist()
-            raise ValueError(f"{flaw.problem} at the point ({x:.6g}, {y:.6g}) of the shape's outline; {flaw.remedy}")
+            raise ValueError(f"{flaw.problem} at the point ({x:.6g}, {y:.6g}){where}; {flaw.remedy}")
 
     def _placed(self, points: np.ndarray) -> np.ndarray:
         """Return points of the family, moved to the centre and turned from x to the axis."""

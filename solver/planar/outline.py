@@ -16,9 +16,12 @@ BISECTIONS = 60
 REFINEMENTS = 12  # halvings of the angle between two rays
 LONG, BENT = 3.0, np.pi / 12  # chord over the mean of the first outline, and turn at its end, from which it is halved
 RAY_SAMPLES = 32  # along a ray from the centre to the outline, and from there to the reach
+DISTANT_SAMPLES = 12  # along a ray from the outline outwards, and inwards
+DEEPEST = 0.5  # of the way from the outline to the centre, where the gap is looked at
 NUDGE = 1e-6  # step to either side of the outline, over the reach
 SLOPE_TOLERANCE, RATE_TOLERANCE = 1e-6, 1e-3  # of the gap's slope on the outline, and of its change across it
 SMOOTH = "give a function that is smooth there, such as a distance, with a non-zero slope on its surface"
+DISTANCE = "give a function that grows as the distance does, such as norm_2(point) - radius"
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +123,30 @@ def find_flaw(form: Form) -> Flaw | None:
     ):
         if flawed.any():
             return _flaw_at(outline, flawed, problem, remedy)
+    return None
+
+
+@lru_cache(maxsize=256)
+def find_distant_flaw(form: Form, farthest: float, deepest: float) -> Flaw | None:
+    """Return where the gap is of no use farther from the outline, ``None`` if that is nowhere.
+
+    Args:
+        form: A shape whose outline has no flaw.
+        farthest: Distance from the centre up to which it is looked at [mm].
+        deepest: Depth up to which it is looked at, where that is not beyond half of the way to the centre [mm].
+    """
+    outline = trace_outline(form)
+    radii = np.linalg.norm(outline, axis=1)
+    parts = (np.arange(1, DISTANT_SAMPLES + 1) / DISTANT_SAMPLES)[:, None] ** 2  # closer to each other near the outline
+    for side, ways, problem in (
+        (1, np.maximum(farthest - radii, 0), "the gap is not positive and finite, with finite derivatives,"),
+        (-1, np.minimum(deepest, DEEPEST * radii), "the gap is not negative and finite, with finite derivatives,"),
+    ):
+        points = ((1 + side * parts * ways / radii)[..., None] * outline).reshape(-1, 2)
+        at = form.derivatives(points)
+        flawed = ~(np.isfinite(at).all(axis=0) & (side * at[0] > 0))
+        if flawed.any():
+            return _flaw_at(points, flawed, problem, DISTANCE)
     return None
 
 

@@ -296,28 +296,3 @@ def test_a_function_that_calls_another_makes_no_family():
 
     with pytest.raises(ValueError, match="calls another function"):
         Family.trace(function)
-
-
-# The inner radius and the depth are those of one polygon, which is fine enough for a thin shape.
-
-
-@pytest.mark.parametrize("radii", [(60, 2), (2, 60), (60, 0.5), (30, 9), (12, 12)])
-def test_the_inner_radius_of_a_thin_shape_is_that_of_the_ellipse(radii):
-    shape = Custom(family=ELLIPSE, sizes=radii, center=(72, 60), axis=(3, 1), reach=63)
-    assert shape.extent.inradius <= min(radii)
-    assert shape.extent.inradius == pytest.approx(min(radii), rel=2e-3)
-    assert shape.extent.min_curvature_radius == pytest.approx(min(radii) ** 2 / max(radii), rel=1e-3)
-
-
-def test_a_thin_shape_that_edges_could_lie_across_is_refused():
-    thin = Custom(family=ELLIPSE, sizes=(60, 2), center=(72, 60), reach=63)
-    for shape in (thin, Ellipse(radii=(60, 2), center=(72, 60))):
-        with pytest.raises(ValueError, match=r"has the radius 2 mm; .* give the robot between=2 or more"):
-            Solver(Robot.prototype(), Scene([shape]))
-    Solver(replace(Robot.prototype(), between=2), Scene([thin]))
-
-
-def test_a_shape_with_a_neck_has_the_curvature_of_the_neck():
-    """A disc of the radius of curvature fits everywhere in a convex shape, but not in a neck."""
-    foci = Family.trace(lambda p, _: ca.norm_2(p - ca.DM([10, 0])) * ca.norm_2(p + ca.DM([10, 0])) - 102)
-    assert Custom(family=foci, center=(60, 90), reach=30).extent.min_curvature_radius == pytest.approx(2**0.5)

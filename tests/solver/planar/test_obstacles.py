@@ -81,5 +81,5 @@ def test_polygon_in_either_sense():
 
 @pytest.mark.parametrize("length", [10**400, math.nan, "180", 0])
 def test_a_length_that_is_none_is_refused(length):
-    with pytest.raises(ValueError, match="length_mm is .*; it must be positive and finite"):
+    with pytest.raises(ValueError, match=r"length_mm is .*; it must be positive and finite"):
         Circle(center=(40, 100), radius=9).check_proportion(length)
