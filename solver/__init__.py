@@ -7,8 +7,9 @@ from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.common.trace import Trace
 from solver.planar.batch import BatchSolver, ReferenceBatch
-from solver.planar.custom import Custom, Family
+from solver.planar.custom import Custom
 from solver.planar.equilibrium import Equilibrium
+from solver.planar.family import Family
 from solver.planar.forces import VirtualWork, force_true, onset_tension, virtual_work
 from solver.planar.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes
 from solver.planar.obstacles import Capsule, Circle, Ellipse, HalfPlane, Polygon

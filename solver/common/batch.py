@@ -37,8 +37,8 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
     Unlike a solver, a batch keeps the present equilibria, as rows of arrays that are written in place.
 
     A batch is for one thread at a time: a call during another thread's raises RuntimeError and changes nothing. Ctrl-C,
-    like any signal whose handler raises, ends a call within a fraction of a second, between two robots. Those that have
-    moved by then keep their new blocks, statuses and counts, the others stay where they were, and :attr:`commands`
+    like any signal whose handler raises, ends a call within a fraction of a second, also amid a step. Robots whose
+    steps had ended keep their new blocks, statuses and counts, the others stay where they were, and :attr:`commands`
     holds the new commands of all. After an interrupted :meth:`rest`, its robots do not move until it is repeated.
 
     Attributes:

@@ -26,8 +26,8 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
         if (touchable[1:] & touchable[:-1]).any() and not 2 * inradius > longest:
             between = math.floor(longest * (robot.between + 1) / (2 * inradius))
             raise ValueError(
-                f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.3g} mm; it could slip "
-                f"between points of the robot, up to {longest:.3g} mm apart: give the robot between={between} or more"
+                f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.6g} mm; it could slip "
+                f"between points of the robot, up to {longest:.6g} mm apart: give the robot between={between} or more"
             )
 
 

@@ -130,6 +130,7 @@ class Obstacle(ABC):
         Raises:
             ValueError: Naming the value and the bound.
         """
+        length_mm = check_positive("length_mm", length_mm)
         largest, smallest = FARTHEST * length_mm, SHARPEST * length_mm
         remedy = (
             f"{largest:.6g} mm, {FARTHEST:g} times the robot's longest length, or rounding of its gap would exceed the "

@@ -34,7 +34,10 @@ class Batch {
 
   Batch(const Robot& robot, int count, int obstacles, int threads)
       : obstacles_(obstacles), scenes_(count), pool_(threads - 1) {
-    for (int k = 0; k < threads; ++k) workers_.push_back(make_continuation<D>(robot, obstacles));
+    for (int k = 0; k < threads; ++k) {
+      workers_.push_back(make_continuation<D>(robot, obstacles));
+      workers_[k]->set_interruption([this, k] { return is_stopped(k); });
+    }
   }
 
   const BlockLayout& layout() const { return workers_[0]->layout(); }
@@ -45,23 +48,25 @@ class Batch {
   void set_obstacles(int robot, std::vector<Obstacle<D>> obstacles) { scenes_[robot] = std::move(obstacles); }
 
   // Calls `work` with a continuation among the obstacles of each of these robots, and its index in the list, until
-  // `stop` returns true in the calling thread.
+  // `stop` returns true. It is called in the calling thread only, between robots and amid their steps.
   template <class Work, class Stop>
   void each(const std::vector<int>& robots, Work work, Stop&& stop) {
+    stop_ = std::ref(stop);
+    stopped_ = false;
     std::atomic<int> next = 0;
     const int count = static_cast<int>(robots.size());
     const auto run = [&](int thread) {
       Continuation<D>& worker = *workers_[thread];
-      for (int first; (first = next.fetch_add(kChunk)) < count;) {
-        for (int k = first; k < std::min(first + kChunk, count); ++k) {
+      for (int first; !stopped_ && (first = next.fetch_add(kChunk)) < count;) {
+        for (int k = first; k < std::min(first + kChunk, count) && !stopped_; ++k) {
           worker.set_obstacles(scenes_[robots[k]]);
           work(worker, k);
         }
-        if (thread == 0 && stop()) next = count;
+        if (thread == 0) is_stopped(0);
       }
     };
     if (workers_.size() == 1 || count <= kAlone) return run(0);
-    pool_.run(std::ref(run));  // a function that owned it would be allocated
+    pool_.run(std::ref(run), [this] { is_stopped(0); });  // a function that owned it would be allocated
   }
 
   template <class Work>
@@ -74,9 +79,20 @@ class Batch {
   static constexpr int kChunk = 2;   // robots taken at a time
   static constexpr int kAlone = 16;  // so few robots are not worth waking a thread for
 
+  // Whether the call under way is to end. The calling thread asks; the others wake it to do so.
+  bool is_stopped(int thread) {
+    if (thread > 0)
+      pool_.beat();
+    else if (!stopped_)
+      stopped_ = stop_();
+    return stopped_;
+  }
+
   int obstacles_;
   std::vector<std::vector<Obstacle<D>>> scenes_;
   std::vector<std::unique_ptr<Continuation<D>>> workers_;
+  std::function<bool()> stop_;  // of the call under way
+  std::atomic<bool> stopped_ = false;
   Pool pool_;
   std::atomic_flag busy_;
 };

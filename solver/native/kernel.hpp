@@ -53,38 +53,61 @@ template <int D>
 class Kernel {
  public:
   Kernel(const Robot& robot, std::vector<Obstacle<D>> obstacles)
-      : obstacles_(std::move(obstacles)),
-        continuation_(make_continuation<D>(robot, static_cast<int>(obstacles_.size()))) {
-    require_points(continuation_->layout(), obstacles_);
-    continuation_->set_obstacles(obstacles_);
-  }
+      : robot_(robot), obstacles_(std::move(obstacles)), idle_(make()), layout_(idle_->layout()) {}
 
-  std::size_t block_size() const { return continuation_->layout().size; }
+  std::size_t block_size() const { return layout_.size; }
 
   std::tuple<Status, int, int> step(const Input& from, const Numbers<D>& command, const Output& to) {
     require_block(from);
     require_size(to.size());
-    const StepResult result = continuation_->follow(from.data(), command.data(), to.data());
+    const Lease continuation(*this);
+    const StepResult result = continuation->follow(from.data(), command.data(), to.data());
+    if (result.interrupted) throw nb::python_error();
     return {result.status, result.iterations, result.factorizations};
   }
 
   std::tuple<std::vector<double>, Reason> trace(const Input& from, const Numbers<D>& command) {
     require_block(from);
     std::vector<double> shapes, to(block_size());
-    const StepResult result = continuation_->trace(from.data(), command.data(), to.data(), shapes);
+    const Lease continuation(*this);
+    const StepResult result = continuation->trace(from.data(), command.data(), to.data(), shapes);
+    if (result.interrupted) throw nb::python_error();
     return {std::move(shapes), result.reason};
   }
 
   Numbers<3> optimality(const Input& block) {
     require_block(block);
-    const Optimality found = continuation_->optimality(block.data());
+    const Lease continuation(*this);
+    const Optimality found = continuation->optimality(block.data());
     return {found.stationarity, found.gap, found.complementarity};
   }
 
  private:
+  // Holds the idle continuation for a call. A call amid another one makes its own: the handler of a signal may step, or
+  // let another thread do so.
+  class Lease {
+   public:
+    explicit Lease(Kernel& kernel) : kernel_(kernel), held_(kernel.idle_ ? std::move(kernel.idle_) : kernel.make()) {}
+    Lease(const Lease&) = delete;
+    ~Lease() { kernel_.idle_ = std::move(held_); }
+    Continuation<D>* operator->() const { return held_.get(); }
+
+   private:
+    Kernel& kernel_;
+    std::unique_ptr<Continuation<D>> held_;
+  };
+
+  std::unique_ptr<Continuation<D>> make() const {
+    auto made = make_continuation<D>(robot_, static_cast<int>(obstacles_.size()));
+    require_points(made->layout(), obstacles_);
+    made->set_obstacles(obstacles_);
+    made->set_interruption([] { return PyErr_CheckSignals() != 0; });
+    return made;
+  }
+
   void require_block(const Input& block) const {
     require_size(block.size());
-    require_sound<D>(continuation_->layout(), block.data());
+    require_sound<D>(layout_, block.data());
   }
 
   void require_size(std::size_t size) const {
@@ -92,8 +115,10 @@ class Kernel {
                                       " numbers; that of this robot and scene has " + std::to_string(block_size()));
   }
 
+  Robot robot_;
   std::vector<Obstacle<D>> obstacles_;
-  std::unique_ptr<Continuation<D>> continuation_;
+  std::unique_ptr<Continuation<D>> idle_;  // none during a call
+  BlockLayout layout_;
 };
 
 template <int D>
@@ -151,6 +176,7 @@ void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands
   each(batch, robots, [&](Continuation<D>& continuation, int k) {
     const int i = robots[k];
     const StepResult result = continuation.follow(block + size * i, command + D * i, block + size * i);
+    if (result.interrupted) return;
     status[i] = static_cast<int>(result.status);
     iterated[i] = result.iterations;
     factored[i] = result.factorizations;

@@ -17,8 +17,10 @@ class Pool {
   Pool(const Pool&) = delete;
   ~Pool() { stop(); }
 
-  // Calls `job` with 0 in this thread and with 1, 2, … in the helpers; returns when all calls have returned.
-  void run(const std::function<void(int)>& job) {
+  // Calls `job` with 0 in this thread and with 1, 2, … in the helpers; returns when all calls have returned. While it
+  // waits for the helpers it calls `poll` now and then, after each `beat`.
+  template <class Poll>
+  void run(const std::function<void(int)>& job, Poll&& poll) {
     if (!team_ || team_->process != getpid()) start();
     Team& team = *team_;
     team.job = &job;
@@ -26,19 +28,34 @@ class Pool {
     team.round.fetch_add(1);
     team.round.notify_all();
     job(0);
-    await(team.busy, [](int busy) { return busy == 0; });
+    for (int beats = team.beats.load(); team.busy.load() > 0; beats = team.beats.load()) {
+      await(team.beats, [beats](int now) { return now != beats; });
+      poll();
+    }
   }
+
+  void run(const std::function<void(int)>& job) {
+    run(job, [] {});
+  }
+
+  // Called by a helper amid a long job.
+  void beat() { beat(*team_); }
 
  private:
   struct Team {
     int process;
     const std::function<void(int)>* job = nullptr;
-    std::atomic<int> round = 0, busy = 0;
+    std::atomic<int> round = 0, busy = 0, beats = 0;
     bool over = false;
     std::vector<std::thread> threads;
   };
 
   static constexpr int kSpins = 2000;  // before a waiting thread sleeps
+
+  static void beat(Team& team) {
+    team.beats.fetch_add(1);
+    team.beats.notify_all();
+  }
 
   template <class Done>
   static int await(std::atomic<int>& value, Done done) {
@@ -62,7 +79,7 @@ class Pool {
           seen = await(team->round, [seen](int round) { return round != seen; });
           if (team->over) return;
           (*team->job)(k);
-          if (team->busy.fetch_sub(1) == 1) team->busy.notify_all();
+          if (team->busy.fetch_sub(1) == 1) beat(*team);
         }
       });
   }

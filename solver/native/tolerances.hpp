@@ -70,6 +70,7 @@ inline constexpr double kUnevenChange =
 inline constexpr double kUnevenTension = 0.001;  // the same, as a fraction of the tension
 inline constexpr double kReturned = 1e-3;  // deviation from the start after the way back, as a fraction of the motion
 inline constexpr int kWork = 4500;         // budget of factorisations of a step
+inline constexpr int kPollPoints = 20000;  // points moved by sub-steps and iterates between polls for an interruption
 inline constexpr int kSubSteps = 400;      // budget of sub-steps, beside twice those of the largest size
 inline constexpr int kBranchEnds = 24;     // budget of branch ends of a step
 

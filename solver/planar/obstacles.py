@@ -139,9 +139,10 @@ class Ellipse(Obstacle):
 
     @property
     def extent(self) -> Extent:
-        """Disc of the larger half-axis, and the curvature at its end."""
+        """Disc of the larger half-axis, and the curvature at its end; the inner radius is that of the outline."""
         small, large = sorted(self.radii)
-        return Extent(self.center, large, small, small**2 / large)
+        inradius = float(distance_to_outline(self.outline(), np.array([self.center]))[0])
+        return Extent(self.center, large, inradius, small**2 / large)
 
     @property
     def surface(self) -> np.ndarray:
@@ -284,6 +285,16 @@ def directions() -> np.ndarray:
     """Return evenly spaced unit vectors, ``(96, 2)``."""
     angles = np.linspace(0, 2 * np.pi, 97)[:-1]
     return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def distance_to_outline(outline: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the distances of points ``(n, 2)`` from the polygon of an outline ``(k, 2)``, ``(n,)`` [mm].
+
+    Inside, this is the depth as the kernel takes it for shapes whose gap is no distance.
+    """
+    chords, offset = np.roll(outline, -1, axis=0) - outline, points[:, None] - outline
+    share = np.clip((offset * chords).sum(axis=2) / np.maximum((chords**2).sum(axis=1), SMALLEST**2), 0, 1)
+    return np.asarray(np.linalg.norm(offset - share[..., None] * chords, axis=2).min(axis=1))
 
 
 def _rounded(core: np.ndarray, radius: float) -> np.ndarray:

@@ -19,7 +19,7 @@ class Solver:
     """Follows the equilibria of a robot among obstacles as its cable is pulled and released (eq. 5).
 
     The equilibrium reached depends on the way there, so the present one is an argument of every step and the solver
-    keeps none.
+    keeps none. Ctrl-C, like any signal whose handler raises, ends a step within a fraction of a second.
 
     Args:
         robot: The robot.

@@ -18,7 +18,7 @@ class SpatialSolver:
     """Follows the equilibria of a robot among obstacles in space as its cables are pulled and released (eq. 13).
 
     The equilibrium reached depends on the way there, so the present one is an argument of every step and the solver
-    keeps none.
+    keeps none. Ctrl-C, like any signal whose handler raises, ends a step within a fraction of a second.
 
     Args:
         robot: The robot.

@@ -129,6 +129,46 @@ TEST_CASE("every robot of a call is worked on once") {
   for (const int count : visits) CHECK(count == 300);
 }
 
+// A step of a robot so finely divided that the continuation asks at every sub-step whether to give up.
+TEST_CASE("an interrupted step writes nothing and leaves no trace in the next one") {
+  const RobotNumbers of{.segments = 2000, .between = 9};
+  const Robot robot = make_robot<2>(of);
+  const std::vector<Obstacle<2>> obstacles{circle(robot, 44, 104, 15)};
+  const double command[] = {6, of.length};
+  const auto follow = [&](Continuation<2>& continuation, std::vector<double>& block) {
+    return continuation.follow(block.data(), command, block.data());
+  };
+  const auto continuation = make_continuation<2>(robot, 1);
+  continuation->set_obstacles(obstacles);
+  std::vector<double> rest(continuation->layout().size);
+  rest[continuation->layout().length.offset] = of.length;
+  std::vector<double> whole = rest;
+  CHECK_FALSE(follow(*continuation, whole).interrupted);
+  for (const int polls : {0, 1, 5}) {
+    int left = polls;
+    continuation->set_interruption([&] { return left-- == 0; });
+    std::vector<double> block = rest;
+    CHECK(follow(*continuation, block).interrupted);
+    CHECK(left == -1);
+    CHECK(block == rest);
+    continuation->set_interruption({});
+    CHECK_FALSE(follow(*continuation, block).interrupted);
+    CHECK(block == whole);
+  }
+}
+
+TEST_CASE("the calling thread is woken while the others work") {
+  Pool pool(2);
+  std::atomic<bool> over = false;
+  int polls = 0;
+  pool.run(
+      [&](int thread) {
+        while (thread > 0 && !over) pool.beat();
+      },
+      [&] { over = ++polls >= 3; });
+  CHECK(polls >= 3);
+}
+
 TEST_CASE("pools can be destroyed, used or unused") {
   for (int round = 0; round < 50; ++round) {
     Pool idle(3), pool(3);

@@ -20,6 +20,7 @@ bool ModelContinuation<Model>::try_free_shape() {
 // Leaves in `trial_` the equilibrium under another command, if it continues the branch from `present_`.
 template <class Model>
 ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Command& command) {
+  if (is_interrupted()) return Move::kRejected;
   present_evaluated_ = false;
   trial_ = present_;
   trial_.command = command;

@@ -1,6 +1,7 @@
 // An equilibrium continued from command to command along its branch, as the robot would move.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -26,6 +27,9 @@ struct Ramp {
 template <int D>
 class Continuation {
  public:
+  // Asked now and then during a call, in the thread of the call, whether to give it up.
+  using Interruption = std::function<bool()>;
+
   virtual ~Continuation() = default;
 
   virtual const BlockLayout& layout() const = 0;
@@ -33,8 +37,10 @@ class Continuation {
   // Switches to another scene with the same number of obstacles. The span must outlive its use.
   virtual void set_obstacles(std::span<const Obstacle<D>> obstacles) = 0;
 
+  virtual void set_interruption(Interruption interruption) = 0;
+
   // Takes the robot from the equilibrium in one block towards the command `target`, cables and length evenly, and
-  // writes the equilibrium reached to another block, which may be the same.
+  // writes the equilibrium reached to another block, which may be the same. Writes nothing where it is interrupted.
   virtual StepResult follow(const double* from, const double* target, double* to) = 0;
 
   // The same, appending every accepted shape to `shapes`: three numbers of each node, the points that can touch, and
@@ -42,7 +48,7 @@ class Continuation {
   virtual StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) = 0;
 
   // Returns whether a ramp gets to its contact force without an event on the way; false as well where the robot at rest
-  // overlaps an obstacle. Writes the last force to `reached`.
+  // overlaps an obstacle, or where it is interrupted. Writes the last force to `reached`.
   virtual bool ramp_reaches_force(const Ramp& ramp, double* reached) = 0;
 
   // Returns how well the equilibrium in a block meets its KKT conditions, evaluated anew from coordinates and

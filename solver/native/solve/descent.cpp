@@ -86,6 +86,8 @@ bool ModelContinuation<Model>::restore_at(const Command& command, bool holding) 
 // equilibrium.
 template <class Model>
 bool ModelContinuation<Model>::descend_once(bool& moved) {
+  moved = false;
+  if (is_interrupted()) return false;
   double cap = kDescentCap;
   for (int shortening = 0; shortening < kDescentShortenings; ++shortening, cap /= 4) {
     trial_ = present_;

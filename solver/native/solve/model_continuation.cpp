@@ -268,6 +268,7 @@ StepResult ModelContinuation<Model>::follow(const double* from, const double* ta
     record_shape();
   }
   result_.status = pursue(wanted);
+  if (result_.interrupted) return result_;
   if (was_exceeded_ && highest(tensions_) > problem_.robot().max_tension) {  // the step ended amid a yield
     present_ = last_held_;
     present_evaluated_ = false;

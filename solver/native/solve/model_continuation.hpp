@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "solve/continuation.hpp"
@@ -35,12 +36,14 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   using Control = typename Model::Control;
   using Frame = typename Model::Frame;
   using Tensions = Vec<kCables>;
+  using Interruption = typename Continuation<kSpace>::Interruption;
 
   ModelContinuation(const Robot& robot, int obstacles);
   ModelContinuation(const ModelContinuation&) = delete;
 
   const BlockLayout& layout() const override { return layout_; }
   void set_obstacles(std::span<const Obstacle<kSpace>> obstacles) override;
+  void set_interruption(Interruption interruption) override { interruption_ = std::move(interruption); }
   StepResult follow(const double* from, const double* target, double* to) override;
   StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) override;
   bool ramp_reaches_force(const Ramp& ramp, double* reached) override;
@@ -79,7 +82,19 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   double travel(const Command& from, const Command& to) const;
   bool pulls_cable(const Command& command) const;
   bool only_releases(const Command& command) const;
-  bool work_is_spent() const { return newton_.factorizations() - factorizations_before_ > tolerances::kWork; }
+  bool work_is_spent() const {
+    return result_.interrupted || newton_.factorizations() - factorizations_before_ > tolerances::kWork;
+  }
+  // Asks whether to give up, at intervals that take a small part of a second. A step that gives up ends as one that has
+  // spent its work.
+  bool is_interrupted() {
+    unpolled_ += points_.size();
+    if (unpolled_ >= tolerances::kPollPoints) {
+      unpolled_ = 0;
+      if (!result_.interrupted && interruption_) result_.interrupted = interruption_();
+    }
+    return result_.interrupted;
+  }
 
   // Whether a shape continues the branch.
   bool try_free_shape();
@@ -124,7 +139,9 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Tensions tensions_{}, trial_tensions_{};
   bool present_evaluated_ = false;  // whether the contact problem is evaluated at `present_`
 
-  StepResult result_;                       // of the step under way
+  StepResult result_;  // of the step under way
+  Interruption interruption_;
+  std::size_t unpolled_ = 0;                // points that were moved since it was asked last
   std::vector<double>* shapes_ = nullptr;   // receives the accepted shapes of a trace
   std::int64_t factorizations_before_ = 0;  // of the step
   Tensions onset_{};                        // tensions where the present contact began

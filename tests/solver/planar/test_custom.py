@@ -276,6 +276,7 @@ def test_smooth_shapes_are_taken_however_they_are_scaled(sharpness):
         (lambda: egg(sizes=("6", 12)), ValueError, "a number of sizes is '6'; it must be finite"),
         (lambda: egg(sizes=6), ValueError, "sizes is 6; it must be a tuple of numbers"),
         (lambda: egg(reach=True), ValueError, "reach is True; it must be positive"),
+        (lambda: Family([]), TypeError, r"text is \[\]; it must be a str: make families by"),
         (lambda: Family.trace(None), TypeError, "function is None; it must be a function"),
         (lambda: Family.trace(lambda point, _: point), ValueError, "it must return one CasADi expression"),
         (lambda: Family.trace(lambda point, _: 3.0), ValueError, "function returned 3.0; it must return one CasADi"),

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Circle, Ellipse, Polygon, Robot, Scene, Solver, Status
+from solver import Circle, Custom, Ellipse, Family, Polygon, Robot, Scene, Solver, Status
 
 TRIANGLE = ((30, 80), (50, 80), (40, 100))
 
@@ -176,3 +176,29 @@ def test_disks_of_a_strongly_bent_robot_meet_and_the_certificate_holds():
         assert residuals.gaps / robot.length_mm <= 1e-9
         assert residuals.complementarity <= 1e-7
         assert residuals.sign == 0
+
+
+# An obstacle is refused where the sweep, which takes depths from an inscribed polygon, sees no core in it.
+
+
+def test_obstacles_just_above_the_least_size_are_refused_or_not_passed_through():
+    disc = Family.trace(lambda point, sizes: point[0] ** 2 + point[1] ** 2 - sizes[0] ** 2, sizes=1)
+    taken = []
+    for radius in 5 + np.array([1e-3, 2.6e-3, 2.8e-3, 3e-3, 5e-3]):
+        place = {"center": (12.4, 144.3)}
+        circle = Solver(Robot.prototype(), Scene([Circle(radius=radius, **place)]))
+        right = circle.step(circle.rest(), 14.0)
+        assert right.status is Status.STALLED
+        for shape in (
+            Ellipse(radii=(radius, radius), **place),
+            Custom(family=disc, sizes=(radius,), reach=6, **place),
+        ):
+            try:
+                solver = Solver(Robot.prototype(), Scene([shape]))
+            except ValueError:
+                continue
+            end = solver.step(solver.rest(), 14.0)
+            taken.append(shape)
+            assert end.status is Status.STALLED
+            assert end.cable_mm == pytest.approx(right.cable_mm, abs=1e-2)
+    assert 2 <= len(taken) <= 8

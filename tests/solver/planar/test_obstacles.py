@@ -77,3 +77,9 @@ def test_polygon_in_either_sense():
     corners = ((30, 90), (50, 90), (50, 100), (30, 100))
     assert Polygon(corners=corners, radius=1) == Polygon(corners=corners[::-1], radius=1)
     assert Polygon(corners=corners[::-1], radius=1).gap(np.array([40.0, 80.0])) == pytest.approx(9)
+
+
+@pytest.mark.parametrize("length", [10**400, math.nan, "180", 0])
+def test_a_length_that_is_none_is_refused(length):
+    with pytest.raises(ValueError, match=r"length_mm is .*; it must be positive and finite"):
+        Circle(center=(40, 100), radius=9).check_proportion(length)
