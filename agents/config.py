@@ -63,8 +63,11 @@ class TrainConfig:
         _check_counts(self, "threads")
         _check_learner(self.learner)
         last = VALIDATION_SEED - self.learner.envs
-        if not 0 <= self.seed <= last:
-            raise ValueError(f"seed is {self.seed}; it must be from 0 to {last}, so that validation scenes stay unseen")
+        if type(self.seed) is not int or not 0 <= self.seed <= last:
+            raise ValueError(
+                f"seed is {self.seed!r}; it must be a whole number from 0 to {last}, so that validation scenes stay "
+                "unseen"
+            )
 
     def matches(self, other: "TrainConfig") -> bool:
         """Return whether both configurations train the same policy, in whatever folder and on however many threads."""
@@ -93,7 +96,7 @@ class TrainConfig:
             settings = dict(values["learner"])
             learner = LEARNERS[settings.pop("name")](**settings)
             return cls(**values | {"run": Path(values["run"]), "learner": learner})
-        except (ValueError, LookupError, TypeError, RecursionError) as error:
+        except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
             raise ValueError(f"not the configuration of a training run: {error!r}") from error
 
     @classmethod
@@ -227,15 +230,15 @@ def _check_names(field: str, names: tuple[str, ...], known: tuple[str, ...]) -> 
 def _check_counts(settings: object, *fields: str) -> None:
     for name in fields:
         value = getattr(settings, name)
-        if value < 1:
-            raise ValueError(f"{name} is {value}; it must be at least 1")
+        if type(value) is not int or value < 1:
+            raise ValueError(f"{name} is {value!r}; it must be a whole number of at least 1")
 
 
 def _check_learner(learner: LearnerSettings) -> None:
     """Refuse settings of another type than their defaults, or out of range."""
     for name, value in asdict(learner).items():
         kind = type(getattr(type(learner)(), name))
-        if not isinstance(value, (int, kind)):
+        if isinstance(value, bool) or not isinstance(value, (int, kind)):
             raise ValueError(f"{name} is {value!r}; it must be of type {kind.__name__}")
         low, high = RANGES.get(name, (-math.inf, math.inf))
         if not (math.isfinite(value) and low <= value <= high):

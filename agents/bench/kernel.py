@@ -128,7 +128,7 @@ def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
     }
 
 
-FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=5) for k in range(31)]
+FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=6) for k in range(31)]
 
 
 def cost(obstacles: list[Circle], model: Literal["paper", "rod"] = "paper", repeats: int = 40) -> float:

@@ -106,8 +106,8 @@ def entries(config: EvaluateConfig) -> list[Entry]:
 
     Raises:
         FileNotFoundError: If a run has no trained policy.
-        UserError: If a file is not a trained policy, the runs have different sensing, or learners are asked for and no
-            trained policy is found.
+        UserError: If a file is not a trained policy or in the folder of another, the runs have different sensing, or
+            learners are asked for and no trained policy is found.
     """
     return _entries_of_runs(config) if config.runs else _entries_of_package(config)
 
@@ -142,7 +142,21 @@ def _entries_of_package(config: EvaluateConfig) -> list[Entry]:
     if learners and not any(entry.files for entry in found):
         example = f"{config.pretrained}/{learners[0]}/{folder_name(config.env_ids[0])}/0{SUFFIX}"
         raise UserError(f"no trained policy found, such as {example}; train them with ccr-gym retrain")
+    for entry in found:
+        _check_files(entry)
     return found
+
+
+def _check_files(entry: Entry) -> None:
+    """Refuse files that are not policies of the learner and environment in whose folder they are."""
+    for policy in entry.load():
+        if isinstance(policy, LearnedPolicy):
+            config = policy.training.config
+            if (policy.name, config.env_id) != (entry.policy, entry.env_id):
+                raise UserError(
+                    f"{policy.path} is a policy that {policy.name} trained on {config.env_id}, in the folder of "
+                    f"{entry.policy} on {entry.env_id}; move it to its own folder"
+                )
 
 
 def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> Result:

@@ -18,10 +18,11 @@ from agents.config import TrainConfig
 from agents.environment import Environment, make_env
 from agents.errors import UserError
 from agents.files import JsonObject
+from agents.learning.checks import Form, check_curve, check_real, check_tensors
 from agents.learning.memory import Memory
 from agents.learning.network import LSTMState, Network, normalized, standard_deviation
 from agents.learning.pretrained import SUFFIX
-from agents.learning.tensors import Tensors, read_tensors, write_tensors
+from agents.learning.tensors import read_tensors, write_tensors
 from agents.policy import Observation
 from agents.tuned import RecurrentPPOSettings
 
@@ -90,6 +91,7 @@ class LearnedPolicy:
         path: File of the policy, or the folder of the run that trained it.
 
     Attributes:
+        path: Its file.
         name: Name of the learner.
         training: How it was trained.
 
@@ -99,12 +101,14 @@ class LearnedPolicy:
     """
 
     def __init__(self, path: Path) -> None:
-        path = path if path.suffix == SUFFIX else path / ACTOR
+        self.path = path = path if path.suffix == SUFFIX else path / ACTOR
+        if path.is_dir():
+            raise UserError(f"{path} is a folder; a trained policy is a file: move it away, and train again")
         if not path.is_file():
             raise FileNotFoundError(f"{path} is missing; train first: ccr-gym train --run {path.parent}")
         with _rejecting(path):
             tensors, values = read_tensors(path)
-            self.training = _training(tensors, values)
+            self.training = _training(values)
         config = self.training.config
         self.name = config.learner.name
         self._state: LSTMState | None = None
@@ -115,10 +119,12 @@ class LearnedPolicy:
         self._memory = None if isinstance(config.learner, RecurrentPPOSettings) else _memory(env, space)
         inputs = spaces.flatdim(space) if self._memory is None else self._memory.size
         with _rejecting(path):
-            self._mean, self._deviation = (tensors[name].numpy().reshape(inputs) for name in ("mean", "deviation"))
             self._network = Network(inputs, spaces.flatdim(env.action_space), config.learner)
-            weights = {name: value.float() for name, value in tensors.items() if name.startswith(WEIGHTS)}
-            self._network.load_state_dict({name.removeprefix(WEIGHTS): value for name, value in weights.items()})
+            weights = self._network.state_dict()
+            forms = {f"{WEIGHTS}{name}": Form(tuple(value.shape), torch.float16) for name, value in weights.items()}
+            check_tensors(tensors, forms | dict.fromkeys(("mean", "deviation"), Form((inputs,))))
+            self._mean, self._deviation = (tensors[name].numpy() for name in ("mean", "deviation"))
+            self._network.load_state_dict({name: tensors[f"{WEIGHTS}{name}"].float() for name in weights})
 
     def reset(self, env: Environment | None = None) -> None:
         """Forget the last episode."""
@@ -152,22 +158,21 @@ def _rejecting(path: Path) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        raise UserError(f"{path} is not a trained policy: {error!r}") from error
+        raise UserError(f"{path} is not a trained policy ({error!r}); remove it, and train again") from error
 
 
-def _training(tensors: Tensors, values: JsonObject) -> TrainingRecord:
+def _training(values: JsonObject) -> TrainingRecord:
     """Return how the policy of a file was trained.
 
     Raises:
-        ValueError: If the file has another format or weights that are not finite.
+        Exception: Of any kind, if the file has another format or is damaged.
     """
     if values["format"] != FORMAT:
         raise ValueError(f"its format is {values['format']}, this version reads {FORMAT}; train the policy again")
-    if not all(tensor.isfinite().all() for tensor in tensors.values()):
-        raise ValueError("its weights are not finite")
     training = values["training"]
-    curve = LearningCurve(tuple(training["steps"]), tuple(training["returns"]))
-    return TrainingRecord(TrainConfig.loads(values["config"]), curve, float(training["seconds"]))
+    steps, returns = check_curve(training["steps"], training["returns"])
+    seconds = check_real("seconds", training["seconds"], 0.0)
+    return TrainingRecord(TrainConfig.loads(values["config"]), LearningCurve(tuple(steps), tuple(returns)), seconds)
 
 
 def _memory(env: Environment, space: spaces.Dict) -> Memory:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,19 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 
 from agents.config import VALIDATION_SEED, TrainConfig
 from agents.errors import UserError
+from agents.files import JsonObject
+from agents.learning.checks import (
+    Form,
+    check_curve,
+    check_names,
+    check_real,
+    check_tensors,
+    check_whole,
+    moment_forms,
+)
+from agents.learning.learners import WARM_UP
 from agents.learning.tensors import Tensors, read_tensors, write_tensors
+from agents.tuned import DistilledSettings, LearnerSettings, SACSettings
 
 CHECKPOINT = "checkpoint.safetensors"
 CHECKPOINTS = 20  # per run, at most
@@ -87,7 +100,8 @@ class TrainingRun:
         if self._path.exists():
             with self.rejecting_damage():
                 tensors, values = read_tensors(self._path)
-                self.progress, self.state = Progress(**values["progress"]), LearnerState(tensors, values["counters"])
+                self.progress = _progress(values["progress"], config.learner)
+                self.state = LearnerState(tensors, _counters(values["counters"], config.learner, self.progress.steps))
         self._began = time.perf_counter() - self.progress.seconds
         self.seed = config.seed if self.state is None else _resumed_seed(config, self.progress.steps)
         self._schedule(0.0)
@@ -132,6 +146,46 @@ class TrainingRun:
         self._next_seconds = self.seconds + duration / WRITING
 
 
+def _progress(values: JsonObject, learner: LearnerSettings) -> Progress:
+    """Return the progress that a checkpoint holds.
+
+    Raises:
+        Exception: Of any kind, if a run with these settings cannot have made it.
+    """
+    check_names(values, Progress.__slots__)
+    round_ = _round(learner)
+    steps = check_whole("steps", values["steps"], round_, max(learner.steps, round_))
+    if steps % round_:
+        raise ValueError(f"steps is {steps}; it must be a multiple of {round_}, after which the learner learns")
+    curve = check_curve(values["curve_steps"], values["curve_returns"], steps)
+    return Progress(steps, check_real("seconds", values["seconds"], 0.0), *curve)
+
+
+def _counters(values: JsonObject, learner: LearnerSettings, steps: int) -> dict[str, int]:
+    """Return the counters that a checkpoint holds.
+
+    Raises:
+        Exception: Of any kind, if they are not those of a learner after these steps.
+    """
+    rounds, counters = steps // _round(learner), {}
+    if isinstance(learner, SACSettings):
+        size = max(learner.buffer // learner.envs, 1)
+        counters = {"position": rounds % size, "full": int(rounds >= size)}
+        counters["updates"] = max(0, rounds - WARM_UP) * learner.gradient_steps
+    elif not isinstance(learner, DistilledSettings):
+        counters = {"updates": rounds * learner.epochs}
+    check_names(values, counters)
+    for name, value in counters.items():
+        if type(values[name]) is not int or values[name] != value:
+            raise ValueError(f"{name} is {values[name]!r:.80}; after {steps} steps it must be {value}")
+    return counters
+
+
+def _round(learner: LearnerSettings) -> int:
+    """Return the environment steps after which a learner learns."""
+    return learner.envs if isinstance(learner, SACSettings) else learner.envs * learner.rollout
+
+
 def _resumed_seed(config: TrainConfig, steps: int) -> int:
     (seed,) = np.random.SeedSequence([config.seed, steps]).generate_state(1)
     return int(seed) % (VALIDATION_SEED - config.learner.envs)
@@ -155,8 +209,9 @@ def restore_learner(model: BaseAlgorithm, steps: int, state: LearnerState) -> No
     """Put an untrained learner into a saved state, after some steps.
 
     Raises:
-        Exception: Of any kind, if the state is that of another learner.
+        Exception: Of any kind, if the state is that of another learner or damaged; the learner is then unchanged.
     """
+    check_tensors(state.tensors, _forms(model, state.counters))
     states = nest_states(state.tensors, model.get_parameters())
     model.set_parameters(states, device="cpu")  # type: ignore[arg-type] # takes more than its annotation says
     model.num_timesteps, model._n_updates = steps, state.counters["updates"]
@@ -169,6 +224,21 @@ def restore_learner(model: BaseAlgorithm, steps: int, state: LearnerState) -> No
         replay.pos, replay.full = state.counters["position"], bool(state.counters["full"])
         for name in REPLAY:
             getattr(replay, name)[: replay.size()] = state.tensors[f"replay.{name}"].numpy()
+
+
+def _forms(model: BaseAlgorithm, counters: Mapping[str, int]) -> dict[str, Form]:
+    """Return the forms of the tensors of a learner with these counters."""
+    forms = {name: Form.of(tensor) for name, tensor in learner_state(model).tensors.items()}
+    if counters["updates"]:
+        for name in model.get_parameters():
+            if name.endswith("optimizer"):
+                forms |= moment_forms(name, attrgetter(name)(model))
+    if isinstance(model, SAC):
+        replay = _replay(model)
+        size = replay.buffer_size if counters["full"] else counters["position"]
+        arrays = {f"replay.{name}": torch.from_numpy(getattr(replay, name)) for name in REPLAY}
+        forms |= {name: Form((size, *array.shape[1:]), array.dtype) for name, array in arrays.items()}
+    return forms
 
 
 def flatten_states(states: Mapping[str, StateDict]) -> Tensors:
@@ -209,10 +279,9 @@ def statistics_tensors(name: str, statistics: RunningMeanStd) -> Tensors:
 
 
 def restore_statistics(name: str, statistics: RunningMeanStd, tensors: Tensors) -> None:
-    """Set running statistics from the tensors of :func:`statistics_tensors`."""
+    """Set running statistics from the tensors of :func:`statistics_tensors`, which have been checked."""
     mean, var, count = (tensors[f"{name}.{key}"].numpy() for key in ("mean", "var", "count"))
-    shape = np.shape(statistics.mean)
-    statistics.mean, statistics.var, statistics.count = mean.reshape(shape), var.reshape(shape), float(count)
+    statistics.mean, statistics.var, statistics.count = mean, var, float(count)
 
 
 def _normalization(model: BaseAlgorithm) -> dict[str, RunningMeanStd]:

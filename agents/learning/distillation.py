@@ -6,7 +6,6 @@ prediction to no-regret online learning" (DAgger), AISTATS 2011. What the histor
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -27,7 +26,9 @@ from agents.learning.checkpoint import (
     restore_statistics,
     statistics_tensors,
 )
+from agents.learning.checks import Form, check_tensors, moment_forms
 from agents.learning.learners import make_envs
+from agents.learning.log import recording
 from agents.learning.network import EPSILON, Network, normalized, standard_deviation
 from agents.policy import motor_actions, search
 from agents.tuned import DistilledSettings
@@ -112,8 +113,10 @@ class Imitation:
         """Restore a state of :meth:`state`.
 
         Raises:
-            Exception: Of any kind, if the state is that of another learner.
+            Exception: Of any kind, if the state is that of another learner or damaged; nothing is then changed.
         """
+        forms = {name: Form.of(tensor) for name, tensor in self.state(steps).tensors.items()}
+        check_tensors(state.tensors, forms | moment_forms("adam", self.adam))
         states = {"network": self.student.network.state_dict(), "adam": self.adam.state_dict()}
         nested = nest_states(state.tensors, states)
         self.student.network.load_state_dict(nested["network"])
@@ -170,7 +173,7 @@ class Rollouts:
             self.rows = rows
 
 
-def distill(run: TrainingRun, settings: DistilledSettings, log: Path, progress: bool) -> tuple[Network, RunningMeanStd]:
+def distill(run: TrainingRun, settings: DistilledSettings, progress: bool) -> tuple[Network, RunningMeanStd]:
     """Train a student to the end of a run; return its network and the statistics that its rows are normalised by."""
     torch.manual_seed(run.config.seed)
     envs = make_envs(run.config, settings.envs, run.seed)
@@ -183,7 +186,9 @@ def distill(run: TrainingRun, settings: DistilledSettings, log: Path, progress: 
     rows, generator = envs.reset(), np.random.default_rng(run.seed)
     assert isinstance(rows, np.ndarray)
     rollouts, first = Rollouts(envs, rows, generator), run.progress.steps // imitation.count
-    with SummaryWriter(str(log)) as writer:
+    with recording(run.config.run) as log:
+        writer = SummaryWriter(str(log))
+    with writer:
         for done in track(range(first, imitation.rounds), "distil", disable=not progress):
             steps = (done + 1) * imitation.count
             rollouts.play(imitation, done)

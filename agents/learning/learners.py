@@ -12,6 +12,7 @@ from agents.learning.network import CLIP, EPSILON
 from agents.learning.sb3_adapter import SB3VecEnv
 from agents.tuned import DistilledSettings, LearnerSettings, PPOSettings, RecurrentPPOSettings, SACSettings
 
+WARM_UP = 100  # steps of all environments, with random actions, before SAC learns
 ALGORITHMS: dict[type[LearnerSettings], type[BaseAlgorithm]] = {
     PPOSettings: PPO,
     RecurrentPPOSettings: RecurrentPPO,
@@ -52,7 +53,7 @@ def _sac(envs: VecNormalize, settings: SACSettings, seed: int) -> SAC:
         envs,
         learning_rate=LinearSchedule(settings.learning_rate, 0.0, 1.0),
         buffer_size=settings.buffer,
-        learning_starts=100 * settings.envs,
+        learning_starts=WARM_UP * settings.envs,
         batch_size=settings.batch_size,
         tau=settings.tau,
         gamma=settings.gamma,

@@ -15,11 +15,11 @@ from agents.learning.actor import ACTOR, LearningCurve, TrainingRecord, export
 from agents.learning.checkpoint import CHECKPOINT, TrainingRun, learner_state, restore_learner
 from agents.learning.distillation import distill
 from agents.learning.learners import make_envs, make_learner, normalized_envs
+from agents.learning.log import LOG, own_files, recording
 from agents.learning.network import Network
 from agents.tuned import DistilledSettings
 
-CONFIG, LOG = "config.json", "log_1"
-EVENTS = f"{LOG}/events.out.tfevents.*"
+CONFIG = "config.json"
 LEAST_INTERVAL = 64  # steps of all environments between two validations
 
 
@@ -56,11 +56,12 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
 
 def _start(config: TrainConfig) -> TrainingRun:
     """Return the run to resume, or a new one after writing its configuration."""
+    log = own_files(config.run)
     if config.restart:
-        delete(config.run, ACTOR, PARTIAL + ACTOR, CHECKPOINT)
+        delete(config.run, ACTOR, PARTIAL + ACTOR, CHECKPOINT, *log)
     run = TrainingRun(config)
     if run.state is None:
-        delete(config.run, EVENTS)
+        delete(config.run, *log)
         config.save(config.run / CONFIG)
     return run
 
@@ -126,27 +127,34 @@ def _refuse_other_files(folder: Path) -> None:
         raise UserError(f"{folder} holds {foreign[0]} but no {CONFIG}; choose a new or empty folder for the run")
 
 
-def delete(folder: Path, *patterns: str) -> None:
-    """Delete files of a run from its folder, and the log folder if it is then empty."""
-    for pattern in patterns:
-        for path in folder.glob(pattern):
-            path.unlink()
+def delete(folder: Path, *names: str) -> None:
+    """Delete files of a run from its folder, and the log folder if it is then empty.
+
+    Raises:
+        UserError: If one of them is a folder; nothing is deleted then.
+    """
+    for name in names:
+        if (folder / name).is_dir():
+            raise UserError(f"{folder / name} is a folder, where the run keeps a file; move it away")
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # it does not exist, or holds other files
         (folder / LOG).rmdir()
 
 
 def _learn(run: TrainingRun, progress: bool) -> tuple[Network, RunningMeanStd]:
     """Train to the end of a run; return the network and the statistics that its rows are normalised by."""
-    config, log = run.config, run.config.run / LOG
+    config = run.config
     if isinstance(config.learner, DistilledSettings):
-        return distill(run, config.learner, log, progress)
+        return distill(run, config.learner, progress)
     envs = normalized_envs(make_envs(config, config.learner.envs, run.seed), config)
     model = make_learner(envs, config)
     if run.state:
         with run.rejecting_damage():
             restore_learner(model, run.progress.steps, run.state)
         model.set_random_seed(run.seed)  # the learner was made with the seed of the configuration
-    model.set_logger(configure(str(log), ["tensorboard"]))
+    with recording(config.run) as log:
+        model.set_logger(configure(str(log), ["tensorboard"]))
     remaining = config.learner.steps - model.num_timesteps
     model.learn(remaining, [Validation(run), Checkpoints(run)], progress_bar=progress, reset_num_timesteps=False)
     assert isinstance(envs.obs_rms, RunningMeanStd)

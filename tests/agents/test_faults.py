@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -18,6 +17,7 @@ from agents.errors import UserError
 from agents.files import LOCK, PARTIAL, locked, replacing, write_text
 from agents.learning import checkpoint, training
 from agents.learning.actor import ACTOR, LearnedPolicy
+from agents.learning.log import OWN
 from agents.tuned import PPOSettings
 from agents.workers import worker_pool
 
@@ -126,10 +126,16 @@ def test_an_interrupt_ends_a_command_in_one_line_and_leaves_no_process(name, sec
     assert not list(tmp_path.rglob(f"{PARTIAL}*"))
 
 
-@pytest.mark.parametrize("package", ["agents", "solver"])
-def test_another_projects_package_is_named(package, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, package, SimpleNamespace(__file__="site-packages/theirs.py", __all__=["Agent"]))
-    assert_one_line(*called(monkeypatch, capsys, "bench"), repr(package), "site-packages/theirs.py", "pip install")
+def test_another_projects_solver_is_named(tmp_path):
+    (tmp_path / "solver.py").write_text("raise SystemExit('imported')")
+    root = Path(cli.__file__).parents[1]
+    code = "import sys; from agents.cli import main; sys.argv = ['ccr-gym', 'bench']; main()"
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, cwd=tmp_path)
+    assert ran.returncode == cli.FAILED
+    assert_one_line(
+        ran.returncode, ran.stderr.splitlines(), "'solver'", str(tmp_path / "solver.py"), "environment of its own"
+    )
 
 
 def test_help_loads_no_learning_library():
@@ -150,7 +156,7 @@ def test_training_on_a_full_disk_goes_on_when_there_is_space(size, file, tmp_pat
     run = tmp_path / "run"
     code, lines = ended(started("train", "--run", run, *SMALL, preexec_fn=limited(size)))
     assert_one_line(code, lines, f"{run / file} cannot be written: File too large")
-    assert {path.name for path in run.iterdir()} <= {LOCK, "config.json", "log_1"}
+    assert {path.name for path in run.iterdir()} <= {LOCK, OWN, "config.json", "log_1"}
     assert ended(started("train", "--run", run, *SMALL)) == (0, [])
     assert LearnedPolicy(run).training.curve.returns
 

@@ -25,7 +25,7 @@ def test_learning():
 def test_kernel():
     assert len(list(kernel.contact_mix(200))) == 200
     assert min(kernel.batch_times(4, steps=3)) > 0
-    assert kernel.cost([kernel.PUSHED], repeats=2) > 0
+    assert kernel.cost([kernel.PUSHED, *kernel.FAR], repeats=2) > 0
 
 
 def test_kernel_in_space():

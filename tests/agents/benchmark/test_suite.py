@@ -1,5 +1,6 @@
 import itertools
 import json
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from agents.benchmark.evaluate import METRICS, Episode, measure, scores
 from agents.benchmark.suite import Entry, play
 from agents.benchmark.sweep import sweep
 from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
+from agents.errors import UserError
 from agents.learning import training
 from agents.learning.actor import ACTOR, LearnedPolicy
 from agents.learning.pretrained import SUFFIX, trained
@@ -172,6 +174,35 @@ def test_runs_of_different_sensing_are_not_compared(run, tmp_path):
         suite.entries(EvaluateConfig(runs=(run, ideal)))
 
 
+def test_a_policy_in_the_folder_of_another_is_named(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "SAC" / "TrackForce-v0" / f"0{SUFFIX}"
+    file.parent.mkdir(parents=True)
+    arguments = ["--policies", "SAC", "--env-ids", "CCR/TrackForce-v0", "--pretrained", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", "evaluate", "--out", str(tmp_path / "out"), *arguments])
+    for learner, env_id in (("SAC", "CCR/LoadCell-v0"), ("PPO", "CCR/TrackForce-v0")):
+        shutil.copyfile(trained(learner, env_id)[0], file)
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        (line,) = capsys.readouterr().err.splitlines()
+        assert ended.value.code == cli.FAILED
+        assert f"{file} is a policy that {learner} trained on {env_id}, in the folder of SAC" in line
+    file.unlink()
+    file.mkdir()
+    with pytest.raises(UserError, match="is a folder"):
+        suite.entries(EvaluateConfig(policies=("SAC",), env_ids=("CCR/TrackForce-v0",), pretrained=tmp_path))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_too_short_for_a_learning_curve_is_evaluated(tmp_path, monkeypatch, capsys):
+    short = PPOSettings(steps=64, envs=4, rollout=16, batch_size=64, epochs=1, width=8)
+    run = train(TrainConfig(run=tmp_path / "run", learner=short, threads=1), progress=False)
+    assert LearnedPolicy(run).training.curve.steps == ()
+    arguments = ["--policies", "PPO", "--episodes", "2", "--jobs", "1", "--no-video", "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", "evaluate", "--runs", str(run), *arguments])
+    cli.main()
+    assert (tmp_path / "out" / "curves.png").exists()
+
+
 def test_names_of_policies_and_environments_are_checked():
     with pytest.raises(ValueError, match="beyond the training seeds"):
         EvaluateConfig(seed=999_999)
@@ -224,7 +255,8 @@ def test_other_weights_do_not_give_the_numbers_of_the_table(noise, tmp_path):
     for name, weight in tensors.items():
         if name.startswith("weights"):
             spread = 0.1 if noise is None else noise * weight.float().abs().mean()
-            tensors[name] = (torch.zeros_like(weight) if noise is None else weight) + spread * torch.randn(weight.shape)
+            other = (torch.zeros_like(weight) if noise is None else weight) + spread * torch.randn(weight.shape)
+            tensors[name] = other.half()
     write_tensors(tmp_path / f"0{SUFFIX}", tensors, values)
     found = first_scores(tmp_path / f"0{SUFFIX}", env_id)
     assert not agrees(found, np.array(SCORES[f"PPO {env_id}"][:SCENES]))

@@ -15,7 +15,7 @@ from agents import files
 from agents.config import TrainConfig
 from agents.errors import UserError
 from agents.files import locked
-from agents.learning import checkpoint, distillation, training
+from agents.learning import checkpoint, distillation, log, training
 from agents.learning.actor import ACTOR, LearnedPolicy, export
 from agents.learning.checkpoint import learner_state
 from agents.learning.learners import ALGORITHMS, make_envs, make_learner, normalized_envs
@@ -116,7 +116,7 @@ def test_a_killed_run_goes_on_and_continues_its_curve(name, tmp_path, monkeypatc
     assert list(training_.curve.steps) == sorted(set(training_.curve.steps))
     assert len(training_.curve.steps) > len(kept.progress.curve_steps)
     assert training_.seconds > kept.progress.seconds
-    assert {path.name for path in tmp_path.iterdir()} == {".lock", ACTOR, training.CONFIG, training.LOG}
+    assert {path.name for path in tmp_path.iterdir()} == {".lock", log.OWN, ACTOR, training.CONFIG, log.LOG}
 
 
 @pytest.mark.parametrize("name", sorted(SMALL))
@@ -190,15 +190,17 @@ def test_writing_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
 
 def test_a_checkpoint_that_was_being_written_does_not_count(tmp_path, monkeypatch):
     def fail(self, target):
-        raise OSError(errno.ENOSPC, "No space left on device")
+        if target.name == checkpoint.CHECKPOINT:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return replace_path(self, target)
 
+    replace_path = files.Path.replace
     config = TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1)
     monkeypatch.setattr(checkpoint, "CHECKPOINTS", 4)
-    monkeypatch.setattr(training.TrainConfig, "save", lambda self, path: path.write_text(self.dumps()))
     monkeypatch.setattr(files.Path, "replace", fail)
     with pytest.raises(UserError, match=r"checkpoint.safetensors cannot be written: No space left"):
         train(config, progress=False)
-    assert {path.name for path in tmp_path.iterdir()} == {".lock", training.CONFIG, training.LOG}
+    assert {path.name for path in tmp_path.iterdir()} == {".lock", log.OWN, training.CONFIG, log.LOG}
 
 
 FOREIGN = ["checkpoint-256/model.zip", "log_1/thesis.txt", "evaluations.npz", ACTOR, "checkpoint.safetensors"]
@@ -222,7 +224,7 @@ def test_a_finished_run_stays_and_begins_again_if_asked(tmp_path):
     config = TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1)
     first = LearnedPolicy(train(config, progress=False)).training
     weights = contents(tmp_path)[ACTOR]
-    others = {"notes.txt": b"mine", f"{training.LOG}/thesis.txt": b"mine", "old/config.json": b"mine"}
+    others = {"notes.txt": b"mine", f"{log.LOG}/thesis.txt": b"mine", "old/config.json": b"mine"}
     for name, content in others.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(content)
@@ -233,9 +235,60 @@ def test_a_finished_run_stays_and_begins_again_if_asked(tmp_path):
     assert again.curve == first.curve
     assert contents(tmp_path)[ACTOR] != weights  # other seconds
     assert others.items() <= contents(tmp_path).items()
-    assert len(list(tmp_path.glob(training.EVENTS))) == 1
+    assert len(list((tmp_path / log.LOG).glob(f"{log.EVENTS}*"))) == 1
     train(replace(config, restart=True, seed=5), progress=False)
     assert TrainConfig.load(tmp_path / training.CONFIG).seed == 5
+
+
+@pytest.mark.parametrize(
+    "learner", [SMALL["PPO"], DistilledSettings(steps=64, envs=2, rollout=4)], ids=lambda s: s.name
+)
+def test_only_the_event_files_of_the_run_are_deleted(tmp_path, monkeypatch, learner):
+    monkeypatch.setattr(distillation, "VALIDATION_EPISODES", 2)
+    config = TrainConfig(run=tmp_path, learner=learner, threads=1)
+    copied = tmp_path / log.LOG / f"{log.EVENTS}mine"
+    train(config, progress=False)
+    (own,) = copied.parent.iterdir()
+    copied.write_bytes(b"mine")
+    train(replace(config, restart=True), progress=False)
+    assert not own.exists()
+    assert copied.read_bytes() == b"mine"
+    assert len(list(copied.parent.iterdir())) == 2
+
+
+def test_a_killed_run_deletes_the_event_files_of_all_its_parts(tmp_path, killed):
+    config = TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1)
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            train(config, progress=False)
+    before = set((tmp_path / log.LOG).iterdir())
+    assert len(before) == 2
+    with pytest.raises(KeyboardInterrupt):
+        train(replace(config, restart=True), progress=False)
+    assert len(list((tmp_path / log.LOG).iterdir())) == 1
+    assert not before & set((tmp_path / log.LOG).iterdir())
+
+
+@pytest.mark.parametrize("record", ["", "{}", "3", "[3]", '["../config.json"]', '["events.out.tfevents.x/../../mine"]'])
+def test_a_damaged_record_deletes_nothing(tmp_path, record):
+    config = TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1)
+    config.save(tmp_path / training.CONFIG)
+    for name, content in ((log.OWN, record), (ACTOR, "actor"), ("mine", "mine")):
+        (tmp_path / name).write_text(content)
+    before = contents(tmp_path)
+    with pytest.raises(UserError, match=r"\.log\.json is damaged .*; delete it"):
+        train(replace(config, restart=True), progress=False)
+    assert {**contents(tmp_path), ".lock": b""} == {**before, ".lock": b""}
+
+
+def test_a_folder_in_the_place_of_a_file_is_named(tmp_path):
+    config = TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1)
+    config.save(tmp_path / training.CONFIG)
+    (tmp_path / ACTOR).write_bytes(b"finished")
+    (tmp_path / checkpoint.CHECKPOINT).mkdir()
+    with pytest.raises(UserError, match=r"checkpoint.safetensors is a folder"):
+        train(replace(config, restart=True), progress=False)
+    assert (tmp_path / ACTOR).read_bytes() == b"finished"
 
 
 def test_two_processes_do_not_train_in_one_folder(tmp_path):

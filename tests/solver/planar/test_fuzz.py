@@ -25,13 +25,13 @@ from solver import (
     Status,
     spatial,
 )
-from solver import sensitivity as sensitivities
 from solver.cache.memo import TransitionMemo
 from solver.planar import forces, free
 from solver.planar.batch import BatchSolver
+from solver.planar.sensitivity import sensitivity
 from solver.spatial import SpatialBatchSolver, SpatialEquilibrium, SpatialRobot, SpatialSensitivity, SpatialSolver
 from solver.spatial import forces as spatial_forces
-from solver.spatial import sensitivity as spatial_sensitivities
+from solver.spatial.sensitivity import spatial_sensitivity
 
 ROBOT = Robot(length_mm=180, segments=6, offset_mm=8, between=2, length_range_mm=(150, 200))
 SPATIAL_ROBOT = SpatialRobot(length_mm=180, segments=6, offset_mm=8, between=2)
@@ -219,11 +219,11 @@ def test_functions(first, second, third):
     survives(free.clearance, first, SCENE, 0.0)
     survives(free.clearance, ROBOT, second, 0.0)
     survives(free.clearance, ROBOT, SCENE, third)
-    survives(sensitivities.sensitivity, first)
-    survives(sensitivities.sensitivity, PULLED, second)
+    survives(sensitivity, first)
+    survives(sensitivity, PULLED, second)
     survives(Sensitivity.obstacle_rows, third)
-    survives(spatial_sensitivities.spatial_sensitivity, first)
-    survives(spatial_sensitivities.spatial_sensitivity, SPATIAL_PULLED, second)
+    survives(spatial_sensitivity, first)
+    survives(spatial_sensitivity, SPATIAL_PULLED, second)
     survives(SpatialSensitivity.obstacle_rows, third)
 
 
