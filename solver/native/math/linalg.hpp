@@ -78,8 +78,8 @@ double lowest(int n, Value value) {
   return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
 }
 
-// Factors a symmetric matrix in place as L D Lᵀ, with unit L below the diagonal and 1/D on it. Returns the number of its
-// negative eigenvalues, which is that of negative pivots, or -1 where a pivot is zero.
+// Factors a symmetric matrix in place as L D Lᵀ, with unit L below the diagonal and 1/D on it. Returns the number of
+// its negative eigenvalues, which is that of negative pivots, or -1 where a pivot is zero.
 template <int N>
 int factorize(Mat<N, N>& a) {
   int negative = 0;

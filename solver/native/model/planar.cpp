@@ -111,7 +111,8 @@ void Planar<Law>::lagrangian_hessian(System& system) const {
       stage.b[0] += bend.dx * bend.stretch;
       stage.b[1] += bend.dy * bend.stretch;
       stage.hux[2] += turn * bend.stretch;
-      stage.huu[0] += 2 * turn * bend.stretch * heading - inward * bend.stretch_slope - slack_multiplier_ * bend.taken_curvature;
+      stage.huu[0] +=
+          2 * turn * bend.stretch * heading - inward * bend.stretch_slope - slack_multiplier_ * bend.taken_curvature;
     }
   }
   system.node_hessian[robot_.segments] = {};

@@ -39,8 +39,8 @@ template <class Law>
 class Planar {
  public:
   static constexpr int kSpace = 2, kTurn = 1, kControl = 1, kCables = 1;
-  static constexpr int kShears = 1;           // leading controls that shear a segment
-  static constexpr int kState = 3;  // x, y, disk angle
+  static constexpr int kShears = 1;  // leading controls that shear a segment
+  static constexpr int kState = 3;   // x, y, disk angle
   static constexpr bool kRod = Law::kRod;
   static constexpr int kTip = 3;  // slopes of the free tip: x, y, angle
 

@@ -59,7 +59,7 @@ void KktSystem<Model>::assemble(const ContactProblem& problem, const ActiveSet& 
     for (int k = 0; k < Model::kShears; ++k) max_curvature_ = std::max(max_curvature_, std::abs(stage.huu(k, k)));
   for (int j = 0; j < active.count; ++j) {
     penalty_[j] = 0;
-    if (strength == 0) continue;
+    if (strength == 0 || active.contact[j] == problem.slack_contact()) continue;
     const Force slope = problem.slope(active.contact[j]).force;
     const double arm = problem.lever_arm(active.contact[j]);
     penalty_[j] = strength * max_curvature_ / (arm * arm);
@@ -133,7 +133,8 @@ int KktSystem<Model>::factor_mounts(double damping) {
       if (columns_[a].mount == columns_[b].mount)
         entry = mount_factor_[columns_[a].mount](columns_[a].axis, columns_[b].axis);
       for (const Force& force : columns_[a].forces) entry -= force.along(columns_[b].response.states);
-      for (int k = 0; k < b; ++k) entry -= schur_[a * touched_ + k] * schur_[b * touched_ + k] * schur_[k * touched_ + k];
+      for (int k = 0; k < b; ++k)
+        entry -= schur_[a * touched_ + k] * schur_[b * touched_ + k] * schur_[k * touched_ + k];
       if (a == b && !(std::abs(entry) > 0)) return -1;
       negative += a == b && entry < 0;
       schur_[a * touched_ + b] = a == b ? entry : entry / schur_[b * touched_ + b];

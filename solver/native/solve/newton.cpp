@@ -43,8 +43,8 @@ bool Newton<Model>::is_equilibrium(const ActiveSet& active) const {
 }
 
 // Factors the exact Hessian; where that fails, with a growing penalty on the active gaps, which leaves the solution
-// unchanged and succeeds if H is positive definite on their tangent space. A rod needs no penalty: whether H is positive
-// definite there is read off its inertia.
+// unchanged and succeeds if H is positive definite on their tangent space. A rod needs no penalty: whether H is
+// positive definite there is read off its inertia.
 template <class Model>
 bool Newton<Model>::factor_penalized(const ActiveSet& active, int penalties) {
   damping_ = 0;
@@ -200,7 +200,8 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
     stable = factor_penalized(at.active, kPenalties) && qp_.solve(problem, kkt_, target, step_);
     if (!stable) {
       target = at.active;
-      if (result.iterations >= damped || !factor_damped(target) || !qp_.solve(problem, kkt_, target, step_)) return result;
+      if (result.iterations >= damped || !factor_damped(target) || !qp_.solve(problem, kkt_, target, step_))
+        return result;
     }
 
     step_size_ = step_size(step_);
