@@ -68,6 +68,25 @@ def sinc_and_cosine(square: Symbol) -> tuple[Symbol, Symbol]:
     return sinc, sinc + 2 * square * slope
 
 
+def sinc_and_slopes(square: Symbol) -> tuple[Symbol, Symbol, Symbol]:
+    """Return S = ``sinc h`` and its first two slopes in z = ``square = h²``, smooth at zero, for |h| ≤ π/2.
+
+    Two power series, of the second and the third slope, give the rest by the differential equation of sinc h,
+    4 z S₂ + 6 S₁ + S = 0, and its derivative, 4 z S₃ + 10 S₂ + S₁ = 0.
+    """
+    second, third = (_sinc_slope(square, order) for order in (2, 3))
+    first = -10 * second - 4 * square * third
+    return -6 * first - 4 * square * second, first, second
+
+
+def _sinc_slope(square: Symbol, order: int) -> Symbol:
+    """Return the slope of some order of ``sinc h`` in ``square = h²``, by its power series."""
+    slope = 0 * square
+    for k in reversed(range(order, SERIES_TERMS + 1)):
+        slope = (-1) ** k * math.perm(k, order) / math.factorial(2 * k + 1) + square * slope
+    return slope
+
+
 @lru_cache(maxsize=64)
 def gap_function(law: GapLaw) -> ca.Function:
     """Return ``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` of one kind of obstacle, and likewise in space."""

@@ -26,6 +26,7 @@ from solver.common.gap_laws import (
     gaps_of,
     half_plane_gap,
     sinc_and_cosine,
+    sinc_and_slopes,
     square_distance,
 )
 from solver.common.node_problem import NodeProblem, first_derivatives, grow, norms, second_derivatives, subdivide
@@ -129,29 +130,28 @@ def segment_function() -> ca.Function:
 
 
 def arc_function() -> ca.Function:
-    """Return the segment law of the rod, whose segments are arcs, with its derivatives in the angle.
+    """``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''`` of a segment that is an arc, for a sliding cable.
 
-    ``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''``, with
     The chord ``c = l0 sinc θ/2`` along the bisector has the components ``l0·(f, g)`` in the frame of the lower disk,
-    ahead and to its left; ``s = l0 − c + 2a sin θ/2`` is the cable displacement that the segment takes up (Rao 2024).
+    ahead and to its left; ``s = l0 − c + 2a sin θ/2`` is what the segment takes from the cable (Rao 2024).
     """
     angle, length, offset = (ca.SX.sym(name) for name in ("angle", "length", "offset"))
-    sinc, cosine = sinc_and_cosine(angle**2 / 4)
-    sine = angle / 2 * sinc
-    sinc_slope = ca.gradient(sinc, angle)
-    shortening = length * (1 - sinc) + 2 * offset * sine
-    slope = ca.gradient(shortening, angle)
+    half = angle / 2
+    square = half**2
+    sinc, first, second = sinc_and_slopes(square)
+    sine, cosine = half * sinc, sinc + 2 * square * first
+    bent, bent_slope = half * first, square * second + first / 2  # slopes of sinc θ/2 in θ, as d(h²)/dθ = h
     law = ca.vertcat(
         angle,
         sinc * cosine,
         -sinc * sine,
-        sinc_slope / sinc,
-        ca.gradient(sinc_slope, angle) / sinc,
+        bent / sinc,
+        bent_slope / sinc,
         1 - 2 * sine**2,
         2 * sine * cosine,
-        shortening,
-        slope,
-        ca.gradient(slope, angle),
+        length * (1 - sinc) + 2 * offset * sine,
+        offset * cosine - length * bent,
+        -offset * sine / 2 - length * bent_slope,
     )
     return ca.Function("ccr_arc", [angle, length, offset], [ca.cse(law)])
 

@@ -89,6 +89,29 @@ inline double cholesky(Dense& a) {
   return least;
 }
 
+// Counts the negative eigenvalues of a symmetric matrix, which Jacobi's rotations make diagonal.
+inline int negative_eigenvalues(Dense a) {
+  const int n = a.rows();
+  for (int sweep = 0; sweep < 30; ++sweep)
+    for (int p = 0; p < n; ++p)
+      for (int q = p + 1; q < n; ++q) {
+        const double angle = std::atan2(2 * a(p, q), a(q, q) - a(p, p)) / 2, c = std::cos(angle), s = std::sin(angle);
+        for (int k = 0; k < n; ++k) {
+          const double left = a(k, p), right = a(k, q);
+          a(k, p) = c * left - s * right;
+          a(k, q) = s * left + c * right;
+        }
+        for (int k = 0; k < n; ++k) {
+          const double upper = a(p, k), lower = a(q, k);
+          a(p, k) = c * upper - s * lower;
+          a(q, k) = s * upper + c * lower;
+        }
+      }
+  int negative = 0;
+  for (int k = 0; k < n; ++k) negative += a(k, k) < 0;
+  return negative;
+}
+
 inline Column solve_cholesky(const Dense& factor, Column x) {
   const auto at = [&](int i) -> double& { return x[static_cast<std::size_t>(i)]; };
   for (int i = 0; i < factor.rows(); ++i) {

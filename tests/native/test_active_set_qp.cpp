@@ -47,7 +47,7 @@ struct Wanted {
   // Puts the walls where the gaps have their wanted values.
   void build_walls() {
     REQUIRE(problem.evaluate(at));
-    if constexpr (Model::kRod) at.command.cables[0] = problem.states().back()[3] - gaps.back();
+    if constexpr (Model::kRod) at.command.cables[0] += problem.gaps()[problem.slack_contact()] - gaps.back();
     obstacles.clear();
     for (int j = 0; j < walls(); ++j)
       obstacles.push_back(for_point(

@@ -153,12 +153,15 @@ void kkt_systems() {
     for (int j = 0; j < touched.at.active.count; ++j)
       for (int r = 0; r < n; ++r)
         for (int c = 0; c < n; ++c) expected(r, c) += system.penalty(j) * gaps(j, r) * gaps(j, c);
-    Dense factor = expected;
-    for (int r = 0; r < n; ++r)  // symmetric but for the differences
-      for (int c = 0; c < n; ++c) factor(r, c) = (expected(r, c) + expected(c, r)) / 2;
+    Dense symmetric = expected;
+    for (int r = 0; r < n; ++r)  // but for the differences
+      for (int c = 0; c < n; ++c) symmetric(r, c) = (expected(r, c) + expected(c, r)) / 2;
+    Dense factor = symmetric;
     const double pivot = cholesky(factor);
     if (std::abs(pivot) < 1e-6) continue;
-    CHECK(system.factor(0) == (pivot > 0));
+    const bool factored = system.factor(0);
+    CHECK((factored && system.negative == 0) == (pivot > 0));
+    if (Model::kRod) CHECK(system.negative == negative_eigenvalues(symmetric));
     if (pivot < 0) continue;
     ++definite;
     check_solutions(touched, system, expected, gaps);

@@ -78,24 +78,26 @@ double lowest(int n, Value value) {
   return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
 }
 
-// Factors a symmetric matrix in place as L D Lᵀ, with unit L below the diagonal and 1/D on it; false unless it is
-// positive definite.
+// Factors a symmetric matrix in place as L D Lᵀ, with unit L below the diagonal and 1/D on it. Returns the number of
+// its negative eigenvalues, which is that of negative pivots, or -1 where a pivot is zero.
 template <int N>
-bool factorize(Mat<N, N>& a) {
+int factorize(Mat<N, N>& a) {
+  int negative = 0;
   for (int j = 0; j < N; ++j) {
     Vec<N> scaled;
     for (int k = 0; k < j; ++k) {
       scaled[k] = a(j, k) / a(k, k);
       a(j, j) -= a(j, k) * scaled[k];
     }
-    if (!(a(j, j) > 0)) return false;
+    if (!(std::abs(a(j, j)) > 0)) return -1;
+    negative += a(j, j) < 0;
     a(j, j) = 1 / a(j, j);
     for (int i = j + 1; i < N; ++i) {
       for (int k = 0; k < j; ++k) a(i, j) -= a(i, k) * scaled[k];
       a(i, j) *= a(j, j);
     }
   }
-  return true;
+  return negative;
 }
 
 template <int N, int C>

@@ -36,9 +36,11 @@ class Riccati {
       for (int c = 0; c < NU; ++c) stages[node].hux(c, r) += turned(r, c);
   }
 
-  // Factors the reduced Hessian plus `damping` on the controls; false unless it is positive definite.
-  bool factor(double damping) {
+  // Factors the reduced Hessian plus `damping` on the controls. Returns the number of its negative eigenvalues, or -1
+  // where it is singular or has more of them than `allowed`.
+  int factor(double damping, int allowed = 0) {
     Mat<NX, NX> p;
+    int negative = 0;
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
       const Stage& s = stages[i];
       p += node_hessian[i + 1];
@@ -48,14 +50,15 @@ class Riccati {
       for (int k = 0; k < NU; ++k) quu(k, k) += damping;
       Mat<NU, NX> qux = times(btp, s.a);
       qux += s.hux;
-      if (!factorize(quu)) return false;
+      const int pivots = factorize(quu);
+      if (pivots < 0 || (negative += pivots) > allowed) return -1;
       factor_[i] = quu;
       gain_[i] = qux;
       solve_factored(quu, gain_[i]);
       p = transpose_times(s.a, times(p, s.a));
       p -= transpose_times(qux, gain_[i]);
     }
-    return true;
+    return negative;
   }
 
   // A linear term in the state of a node, and in that of the next one where `split`.

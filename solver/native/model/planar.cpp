@@ -35,14 +35,15 @@ Planar<Law>::Planar(const Robot& robot)
       robot_(robot),
       bends_(robot.segments),
       free_bend_(1),
-      adjoints_(robot.segments) {}
+      adjoints_(robot.segments),
+      minus_taken_slopes_(kRod ? robot.segments : 0) {}
 
 template <class Law>
 bool Planar<Law>::evaluate(const Command<1>& command, const std::vector<Control>& controls) {
   const int n = robot_.segments;
   displacement_ = command.cables[0] / n;
   length_ = command.length / n;
-  objective = max_objective_slope = widest = 0;
+  objective = max_objective_slope = widest = taken_ = 0;
   Law::bend(n, controls[0].v.data(), displacement_, length_, robot_.offset, bends_);
   states[0] = {};
   frames[0] = {{1, 0}};
@@ -58,7 +59,10 @@ bool Planar<Law>::evaluate(const Command<1>& command, const std::vector<Control>
     next[0] += dx;
     next[1] += dy;
     next[2] -= bend.angle;
-    if constexpr (kRod) next[3] += bend.taken;
+    if constexpr (kRod) {
+      taken_ += bend.taken;
+      minus_taken_slopes_[i][0] = -bend.taken_slope;
+    }
     objective += bend.angle * bend.angle;
     max_objective_slope = std::max(max_objective_slope, std::abs(2 * bend.angle * bend.slope));
     widest = std::max(widest, std::abs(bend.angle));
@@ -75,9 +79,16 @@ void Planar<Law>::propagate_adjoints(const std::vector<State>& node_forces) {
     adjoints_[i] = p;
     const double turn = turning(p, bend);
     gradient[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
-    if constexpr (kRod) gradient[i][0] += p[3] * bend.taken_slope - inward(p, bend) * bend.stretch;
+    if constexpr (kRod) gradient[i][0] -= inward(p, bend) * bend.stretch;
     p[2] += turn;
   }
+  slack_multiplier_ = 0;
+}
+
+template <class Cable>
+void Planar<Cable>::add_slack(double multiplier) requires(kRod) {
+  slack_multiplier_ = multiplier;
+  for (int i = 0; i < robot_.segments; ++i) gradient[i][0] += multiplier * minus_taken_slopes_[i][0];
 }
 
 template <class Law>
@@ -99,9 +110,9 @@ void Planar<Law>::lagrangian_hessian(System& system) const {
     if constexpr (kRod) {
       stage.b[0] += bend.dx * bend.stretch;
       stage.b[1] += bend.dy * bend.stretch;
-      stage.b[3] = bend.taken_slope;
       stage.hux[2] += turn * bend.stretch;
-      stage.huu[0] += p[3] * bend.taken_curvature + 2 * turn * bend.stretch * heading - inward * bend.stretch_slope;
+      stage.huu[0] +=
+          2 * turn * bend.stretch * heading - inward * bend.stretch_slope - slack_multiplier_ * bend.taken_curvature;
     }
   }
   system.node_hessian[robot_.segments] = {};

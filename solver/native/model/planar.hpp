@@ -39,8 +39,8 @@ template <class Law>
 class Planar {
  public:
   static constexpr int kSpace = 2, kTurn = 1, kControl = 1, kCables = 1;
-  static constexpr int kShears = 1;           // leading controls that shear a segment
-  static constexpr int kState = Law::kState;  // x, y, disk angle; rod: cable taken
+  static constexpr int kShears = 1;  // leading controls that shear a segment
+  static constexpr int kState = 3;   // x, y, disk angle
   static constexpr bool kRod = Law::kRod;
   static constexpr int kTip = 3;  // slopes of the free tip: x, y, angle
 
@@ -70,7 +70,11 @@ class Planar {
   double free_slack_multiplier() const requires(kRod) { return 2 * free_control_[0] / free_bend_[0].taken_slope; }
   Vec<kTip> free_slopes(const Command<1>& command);
 
-  double slack(const Command<1>& command) const requires(kRod) { return states.back()[kState - 1] - command.cables[0]; }
+  // What bending takes from a sliding cable beyond what is pulled [mm], and minus its slope in every control.
+  double slack(const Command<1>& command) const requires(kRod) { return taken_ - command.cables[0]; }
+  const std::vector<Control>& minus_slack_slopes() const requires(kRod) { return minus_taken_slopes_; }
+  // Adds the slack with a multiplier to the Lagrangian; follows adjoin.
+  void add_slack(double multiplier) requires(kRod);
   DiskGap disk_gap(int segment, int side) const requires(kRod);  // side 1 is that of the cable, -1 the other
   // Sine of the shear angle at which a segment folds over.
   double widest_shear() const { return kRod ? HUGE_VAL : 1 - displacement_ / length_; }
@@ -92,6 +96,8 @@ class Planar {
   Command<1> free_command_{{{-1}}, 0};
   Control free_control_{};
   std::vector<State> adjoints_;  // of the upper state of each segment
+  double taken_ = 0, slack_multiplier_ = 0;
+  std::vector<Control> minus_taken_slopes_;
 };
 
 }  // namespace ccr

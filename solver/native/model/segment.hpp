@@ -49,7 +49,6 @@ class Table : public Rows {
 // The paper's model: each segment takes an equal share of the cable. Its coordinate is σ, the sine of the shear angle;
 // its backbone stays straight.
 struct PaperLaw {
-  static constexpr int kState = 3;  // x, y, disk angle
   static constexpr bool kRod = false;
 
   struct Bend {
@@ -67,9 +66,8 @@ struct PaperLaw {
 };
 
 // The discrete rod (Rao 2024): the cable slides through all disks. A segment is an arc, its coordinate the angle θ
-// between its disks. The state sums the cable taken by the segments, which must not be less than the displacement.
+// between its disks. What the segments take from the cable together must not be less than the displacement.
 struct RodLaw {
-  static constexpr int kState = 4;  // x, y, disk angle, cable taken
   static constexpr bool kRod = true;
 
   struct Bend {

@@ -43,29 +43,40 @@ void ActiveSetQp<Model>::remove_contact(ActiveSet& active, int j, int responses)
   active.drop(j);
 }
 
-// Cholesky factor of ∇cᵀH⁻¹∇c over the active gaps; false where they are linearly dependent.
+// Factors ∇cᵀH⁻¹∇c over the active gaps, which may be linearly dependent, or leave a direction of negative curvature.
 template <class Model>
-bool ActiveSetQp<Model>::factor_gram(const ActiveSet& active) {
+ActiveSetQp<Model>::Gram ActiveSetQp<Model>::factor_gram(const ActiveSet& active) {
+  int negative = 0;
   for (int j = 0; j < active.count; ++j)
     for (int i = j; i < active.count; ++i) {
       const double entry = along(i, responses_[j]);
       double sum = entry;
-      for (int k = 0; k < j; ++k) sum -= gram_[i][k] * gram_[j][k];
-      if (i == j && !(sum > kDependent * entry)) return false;
-      gram_[i][j] = i == j ? std::sqrt(sum) : sum / gram_[j][j];
+      for (int k = 0; k < j; ++k) sum -= gram_[i][k] * gram_[j][k] * gram_[k][k];
+      if (i == j && !(std::abs(sum) > kDependent * std::abs(entry))) return Gram::kDependent;
+      negative += i == j && sum < 0;
+      gram_[i][j] = i == j ? sum : sum / gram_[j][j];
     }
-  return true;
+  return negative == negative_ ? Gram::kSound : Gram::kUnstable;
+}
+
+template <class Model>
+bool ActiveSetQp<Model>::is_stable(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active) {
+  negative_ = kkt.negative;
+  if (negative_ == 0) return true;
+  if (negative_ > active.count) return false;
+  for (int j = 0; j < active.count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
+  kkt.solve(problem, std::span(loads_).first(active.count));
+  return factor_gram(active) == Gram::kSound;
 }
 
 template <class Model>
 void ActiveSetQp<Model>::solve_gram(int count, Multipliers& x) const {
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < i; ++k) x[i] -= gram_[i][k] * x[k];
-    x[i] /= gram_[i][i];
   }
   for (int i = count - 1; i >= 0; --i) {
-    for (int k = i + 1; k < count; ++k) x[i] -= gram_[k][i] * x[k];
     x[i] /= gram_[i][i];
+    for (int k = i + 1; k < count; ++k) x[i] -= gram_[k][i] * x[k];
   }
 }
 
@@ -90,18 +101,20 @@ void ActiveSetQp<Model>::apply(const Multipliers& change, ActiveSet& active, Dir
 
 // Closes the active gaps; where λ + Δλ < 0 for any, removes the lowest and tries again.
 template <class Model>
-void ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step) {
+bool ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step) {
   while (active.count > 0) {
     int lowest;
     const auto begin = active.multiplier.begin(), end = begin + active.count;
-    if (factor_gram(active)) {
+    const Gram gram = factor_gram(active);
+    if (gram == Gram::kUnstable) return false;
+    if (gram == Gram::kSound) {
       const Multipliers change = closing_multipliers(problem, active, step);
       lowest = 0;
       for (int j = 1; j < active.count; ++j)
         if (begin[j] + change[j] < begin[lowest] + change[lowest]) lowest = j;
       if (begin[lowest] + change[lowest] >= 0) {
         apply(change, active, step);
-        return;
+        return true;
       }
     } else {
       lowest = static_cast<int>(std::min_element(begin, end) - begin);
@@ -109,6 +122,7 @@ void ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem
     step.add(-begin[lowest], responses_[lowest]);
     remove_contact(active, lowest, active.count);
   }
+  return negative_ == 0;
 }
 
 // Adds a violated gap by dual steps: its multiplier grows until the gap is closed. A step that would make another
@@ -124,7 +138,7 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
   for (;;) {
     const int count = active.count;
     const Direction& response = responses_[count];
-    if (!factor_gram(active)) return false;
+    if (factor_gram(active) != Gram::kSound) return false;
     Multipliers coupling, trade;
     for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(j, response);
     solve_gram(count, trade);
@@ -140,7 +154,7 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
         blocking = j;
       }
     const double shortfall = -problem.gaps()[contact] - along(count, step);
-    const double to_close = curvature > kDependent * full ? shortfall / curvature : kNever;
+    const double to_close = curvature > kDependent * std::abs(full) ? shortfall / curvature : kNever;
     const double length = std::min(to_release, to_close);
     if (!(length < kNever)) return false;
 
@@ -195,7 +209,7 @@ int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const Activ
 template <class Model>
 bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active,
                                       Direction& step) {
-  drop_negative_multipliers(problem, active, step);
+  if (!drop_negative_multipliers(problem, active, step)) return false;
   for (int change = 0; change < kActiveSetChanges; ++change) {
     const int contact = most_violated(problem, active, step);
     if (contact < 0) return true;
@@ -207,6 +221,7 @@ bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& 
 template <class Model>
 bool ActiveSetQp<Model>::solve(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
   int count = 0;
+  negative_ = kkt.negative;
   for (; count < active.count; ++count)
     loads_[count] = linearize_gap(problem, active.contact[count], count, kkt.penalty(count));
   loads_[count++] = {nullptr, &step};
@@ -217,6 +232,7 @@ bool ActiveSetQp<Model>::solve(const ContactProblem& problem, KktSystem& kkt, Ac
 
 template <class Model>
 bool ActiveSetQp<Model>::restore(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
+  negative_ = kkt.negative;
   for (int j = 0; j < active.count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
   std::fill_n(active.multiplier.begin(), active.count, kHeld);
   step.clear();
@@ -229,7 +245,7 @@ bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, 
   const Load load{nullptr, &step};
   kkt.solve(problem, {&load, 1});
   add_penalty_response(problem, active, step);
-  if (!factor_gram(active)) return false;
+  if (factor_gram(active) != Gram::kSound) return false;
   apply(closing_multipliers(problem, active, step), active, step);
   const auto end = active.multiplier.begin() + active.count;
   return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });

@@ -20,6 +20,10 @@ class ActiveSetQp {
 
   ActiveSetQp(int segments, int mounts);
 
+  // Returns whether H is positive definite on the tangent space of the active gaps: ∇cᵀH⁻¹∇c has as many negative
+  // eigenvalues as H.
+  bool is_stable(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active);
+
   // Finds the step that minimises the model subject to all linearised gaps. On entry `active` holds the multipliers
   // that the gradient contains; on success it is the active set of the solution. False where no step was found.
   bool solve(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
@@ -32,6 +36,7 @@ class ActiveSetQp {
   bool correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
  private:
+  enum class Gram { kSound, kDependent, kUnstable };
   using Multipliers = std::array<double, tolerances::kMaxActive>;
   using Load = typename KktSystem::Load;
 
@@ -39,9 +44,9 @@ class ActiveSetQp {
   Load linearize_gap(const ContactProblem& problem, int contact, int j, double penalty);
   void add_penalty_response(const ContactProblem& problem, const ActiveSet& active, Direction& step) const;
   void remove_contact(ActiveSet& active, int j, int responses);
-  bool factor_gram(const ActiveSet& active);
+  Gram factor_gram(const ActiveSet& active);
   void solve_gram(int count, Multipliers& x) const;
-  void drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step);
+  bool drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step);
   bool satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
   Multipliers closing_multipliers(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const;
   void apply(const Multipliers& change, ActiveSet& active, Direction& step) const;
@@ -53,7 +58,8 @@ class ActiveSetQp {
   std::vector<double> penalties_;     // contained in H
   std::vector<Direction> responses_;  // H⁻¹∇c
   std::vector<Load> loads_;
-  std::array<Multipliers, tolerances::kMaxActive> gram_;
+  std::array<Multipliers, tolerances::kMaxActive> gram_;  // ∇cᵀH⁻¹∇c as L D Lᵀ: unit L below the diagonal, D on it
+  int negative_ = 0;                                      // eigenvalues of H
 };
 
 }  // namespace ccr

@@ -68,14 +68,14 @@ void ModelContinuation<Model>::read_active_set(const double* block) {
   active.count = 0;
   const int points = static_cast<int>(points_.size());
   const double *flags = block + layout_.flags.offset, *multipliers = block + layout_.multipliers.offset;
+  if (Model::kRod && tensions_[0] > 0)  // first, as a robot that it holds need not be stable without it
+    add_contact(active, problem_.slack_contact(),
+                tensions_[0] / problem_.robot().energy_scale(present_.command.length));
   if (std::find(flags, flags + points, 1.0) != flags + points)
     for (int c = 0; c < problem_.contacts(); ++c)
       if (flags[c % points] != 0 && multipliers[c] > 0 && active.count < kMaxActive)
         add_contact(active, c, multipliers[c]);
   if (!Model::kRod) return;
-  if (tensions_[0] > 0)
-    add_contact(active, problem_.slack_contact(),
-                tensions_[0] / problem_.robot().energy_scale(present_.command.length));
   const double* disks = block + layout_.disk_multipliers.offset;
   for (int i = 0; i < problem_.robot().segments; ++i)
     if (disks[i] != 0) add_contact(active, problem_.first_disk_contact() + 2 * i + (disks[i] < 0), std::abs(disks[i]));

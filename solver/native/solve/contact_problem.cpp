@@ -129,10 +129,10 @@ Gap<ContactProblem<Model>::kSpace> ContactProblem<Model>::gap(int contact) const
 template <class Model>
 ContactProblem<Model>::Slope ContactProblem<Model>::slope(int contact) const {
   if constexpr (Model::kRod) {
-    if (contact == slack_contact()) return {{robot_.segments, false, {{0, 0, 0, 1}}, {}}, -1, {}};
+    if (contact == slack_contact()) return {{}, -1, {}, model_.minus_slack_slopes().data()};
     if (contact > slack_contact()) {  // a function of the angle between two nodes
       const double slope = disk_gap(contact).slope;
-      return {{(contact - first_disk_contact()) / 2, true, {{0, 0, slope, 0}}, {{0, 0, -slope, 0}}}, -1, {}};
+      return {{(contact - first_disk_contact()) / 2, true, {{0, 0, slope}}, {{0, 0, -slope}}}, -1, {}};
     }
   }
   const Position normal = gap(contact).slope;
@@ -187,9 +187,14 @@ double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) co
 template <class Model>
 void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
   std::fill(node_forces_.begin(), node_forces_.end(), State{});
+  double slack_multiplier = 0;
   for (std::size_t m = 0; m < springs_.size(); ++m) mount_gradient_[m] = times(springs_[m], displacements_[m]);
   for (int j = 0; j < active.count; ++j) {
-    const auto& [force, mount, normal] = slope(active.contact[j]);
+    if (active.contact[j] == slack_contact()) {
+      slack_multiplier = active.multiplier[j];
+      continue;
+    }
+    const auto& [force, mount, normal, minus_controls] = slope(active.contact[j]);
     if (mount >= 0)
       for (int k = 0; k < kSpace; ++k) mount_gradient_[mount][k] += active.multiplier[j] * normal[k];
     for (int k = 0; k < kState; ++k) {
@@ -198,6 +203,8 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
     }
   }
   model_.propagate_adjoints(node_forces_);
+  if constexpr (Model::kRod)
+    if (slack_multiplier != 0) model_.add_slack(slack_multiplier);
   if (in_barrier())
     for (std::size_t i = 0; i < barrier_slope_.size(); ++i) model_.gradient[i] += barrier_slope_[i];
 }
@@ -211,7 +218,7 @@ void ContactProblem<Model>::lagrangian_hessian(const ActiveSet& active, System& 
     const int contact = active.contact[j];
     if constexpr (Model::kRod)
       if (contact > slack_contact()) add_disk_curvature(contact, -active.multiplier[j], system);
-    if (contact >= contacts()) continue;  // the slack is linear in the state
+    if (contact >= contacts()) continue;  // the model has the curvature of the slack
     const Gap<kSpace> gap = this->gap(contact);
     const Site& site = this->site(contact);
     const double scale = -active.multiplier[j];

@@ -60,17 +60,26 @@ class ContactProblem {
   using Tensions = Vec<Model::kCables>;
 
   // Gradient of a gap in the states of the nodes beside its point and, with the opposite sign of that in the point, in
-  // the displacement of its mount.
+  // the displacement of its mount; that of a slack is in the controls alone.
   struct Slope {
     Force force;
     int mount;  // -1 for a fixed obstacle
     Position normal;
+    const Control* minus_controls = nullptr;  // (n), negated as a right-hand side of the controls is
 
     template <class Direction>
     double along(const Direction& d) const {
+      if constexpr (Model::kRod)
+        if (minus_controls) return -dot_controls(minus_controls, d.controls);
       return force.along(d.states) - (mount < 0 ? 0.0 : dot(normal, d.mounts[mount]));
     }
   };
+
+  static double dot_controls(const Control* a, const std::vector<Control>& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < b.size(); ++i) sum += dot(a[i], b[i]);
+    return sum;
+  }
 
   // `obstacles` is the number of obstacles of every scene.
   ContactProblem(const Robot& robot, int obstacles);

@@ -58,6 +58,8 @@ void KktSystem<Model>::assemble(const ContactProblem& problem, const ActiveSet& 
   for (const auto& stage : system_.stages)
     for (int k = 0; k < Model::kShears; ++k) max_curvature_ = std::max(max_curvature_, std::abs(stage.huu(k, k)));
   for (int j = 0; j < active.count; ++j) {
+    penalty_[j] = 0;
+    if (strength == 0 || active.contact[j] == problem.slack_contact()) continue;
     const Force slope = problem.slope(active.contact[j]).force;
     const double arm = problem.lever_arm(active.contact[j]);
     penalty_[j] = strength * max_curvature_ / (arm * arm);
@@ -105,11 +107,17 @@ void KktSystem<Model>::assemble_mounts(const ContactProblem& problem, const Acti
 template <class Model>
 bool KktSystem<Model>::factor(double damping) {
   ++factorizations;
-  return system_.factor(damping) && (mount_hessian_.empty() || factor_mounts(damping / (arm_ * arm_)));
+  negative = system_.factor(damping, Model::kRod ? static_cast<int>(system_.stages.size()) : 0);
+  if (negative < 0 || mount_hessian_.empty()) return negative >= 0;
+  const int of_mounts = factor_mounts(damping / (arm_ * arm_));
+  if (of_mounts < 0 || (of_mounts > 0 && !Model::kRod)) return false;
+  negative += of_mounts;
+  return true;
 }
 
 template <class Model>
-bool KktSystem<Model>::factor_mounts(double damping) {
+int KktSystem<Model>::factor_mounts(double damping) {
+  int negative = 0;
   for (std::size_t m = 0; m < mount_hessian_.size(); ++m) {
     mount_factor_[m] = mount_hessian_[m];
     for (int k = 0; k < kSpace; ++k) mount_factor_[m](k, k) += damping;
@@ -125,13 +133,16 @@ bool KktSystem<Model>::factor_mounts(double damping) {
       if (columns_[a].mount == columns_[b].mount)
         entry = mount_factor_[columns_[a].mount](columns_[a].axis, columns_[b].axis);
       for (const Force& force : columns_[a].forces) entry -= force.along(columns_[b].response.states);
-      for (int k = 0; k < b; ++k) entry -= schur_[a * touched_ + k] * schur_[b * touched_ + k];
-      if (a == b && !(entry > 0)) return false;
-      schur_[a * touched_ + b] = a == b ? std::sqrt(entry) : entry / schur_[b * touched_ + b];
+      for (int k = 0; k < b; ++k)
+        entry -= schur_[a * touched_ + k] * schur_[b * touched_ + k] * schur_[k * touched_ + k];
+      if (a == b && !(std::abs(entry) > 0)) return -1;
+      negative += a == b && entry < 0;
+      schur_[a * touched_ + b] = a == b ? entry : entry / schur_[b * touched_ + b];
     }
+  // Of a touched mount only the Schur complement matters, whose curvature may have any sign.
   for (Mat<kSpace, kSpace>& factor : mount_factor_)
-    if (!factorize(factor)) return false;
-  return true;
+    if (const int own = factorize(factor); own < 0 || (own > 0 && !Model::kRod)) return -1;
+  return negative;
 }
 
 // Completes the response of the chain alone, with the right-hand side of the mounts in `response.mounts`, to that of
@@ -142,11 +153,10 @@ void KktSystem<Model>::couple_mounts(Direction& response) {
     moves_[a] = response.mounts[columns_[a].mount][columns_[a].axis];
     for (const Force& force : columns_[a].forces) moves_[a] -= force.along(response.states);
     for (int k = 0; k < a; ++k) moves_[a] -= schur_[a * touched_ + k] * moves_[k];
-    moves_[a] /= schur_[a * touched_ + a];
   }
   for (int a = touched_ - 1; a >= 0; --a) {
-    for (int k = a + 1; k < touched_; ++k) moves_[a] -= schur_[k * touched_ + a] * moves_[k];
     moves_[a] /= schur_[a * touched_ + a];
+    for (int k = a + 1; k < touched_; ++k) moves_[a] -= schur_[k * touched_ + a] * moves_[k];
   }
   for (std::size_t m = 0; m < mount_factor_.size(); ++m) solve_factored(mount_factor_[m], response.mounts[m]);
   for (int a = 0; a < touched_; ++a) {
@@ -160,8 +170,9 @@ void KktSystem<Model>::solve(const ContactProblem& problem, std::span<const Load
   for (std::size_t k = 0; k < loads.size(); ++k) {
     Direction& response = *loads[k].response;
     const Slope* gap = loads[k].gap;
-    loads_[k] = {gap ? nullptr : problem.gradient().data(), gap ? std::span(&gap->force, 1) : std::span<const Force>(),
-                 response.controls.data(), response.states.data()};
+    const auto* slope = gap ? gap->minus_controls : problem.gradient().data();
+    loads_[k] = {slope, slope ? std::span<const Force>() : std::span(&gap->force, 1), response.controls.data(),
+                 response.states.data()};
   }
   system_.respond(std::span(loads_).first(loads.size()));
   if (mount_hessian_.empty()) return;

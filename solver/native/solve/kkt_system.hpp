@@ -40,12 +40,14 @@ class KktSystem {
   // Assembles the Hessian at the problem's shape, with a penalty on each active gap: `strength` times the largest
   // curvature of a control.
   void assemble(const ContactProblem& problem, const ActiveSet& active, double strength);
-  // Factors it plus `damping` on all unknowns; false unless positive definite.
+  // Factors it plus `damping` on all unknowns; false where it is singular, or not positive definite and has to be. That
+  // of a rod may have `negative` eigenvalues, which its taut cable and contacts make up for.
   bool factor(double damping);
   // Solves for several right-hand sides: H⁻¹ times the gradient of a gap, or -H⁻¹ times that of the Lagrangian.
   void solve(const ContactProblem& problem, std::span<const Load> loads);
 
   std::int64_t factorizations = 0;                         // so far
+  int negative = 0;                                        // eigenvalues at the last factor
   double penalty(int j) const { return penalty_[j]; }      // on the j-th active gap
   double max_curvature() const { return max_curvature_; }  // of a shear
 
@@ -64,7 +66,7 @@ class KktSystem {
   };
 
   void assemble_mounts(const ContactProblem& problem, const ActiveSet& active);
-  bool factor_mounts(double damping);
+  int factor_mounts(double damping);  // negative eigenvalues, -1 where it is singular
   void couple_mounts(Direction& response);
 
   System system_;
@@ -72,7 +74,7 @@ class KktSystem {
   std::vector<Mat<kSpace, kSpace>> mount_hessian_, mount_factor_;  // of each mount, without the chain
   std::vector<Column> columns_;
   int touched_ = 0;            // number of columns in use
-  std::vector<double> schur_;  // Cholesky factor of the Schur complement, (touched, touched)
+  std::vector<double> schur_;  // Schur complement as L D Lᵀ: unit L below the diagonal, D on it, (touched, touched)
   std::vector<double> moves_;  // solution in these columns
   double max_curvature_ = 0;
   double arm_ = 1;  // lever that converts damping of controls to damping of mounts [mm]

@@ -43,10 +43,15 @@ bool Newton<Model>::is_equilibrium(const ActiveSet& active) const {
 }
 
 // Factors the exact Hessian; where that fails, with a growing penalty on the active gaps, which leaves the solution
-// unchanged and succeeds if H is positive definite on their tangent space.
+// unchanged and succeeds if H is positive definite on their tangent space. A rod needs no penalty: whether H is
+// positive definite there is read off its inertia.
 template <class Model>
 bool Newton<Model>::factor_penalized(const ActiveSet& active, int penalties) {
   damping_ = 0;
+  if (Model::kRod) {
+    kkt_.assemble(problem, active, 0);
+    return kkt_.factor(0);
+  }
   double strength = kPenalty;
   for (int attempt = 0; attempt < (active.count > 0 ? penalties : 1); ++attempt, strength *= kPenaltyGrowth) {
     kkt_.assemble(problem, active, strength);
@@ -55,21 +60,47 @@ bool Newton<Model>::factor_penalized(const ActiveSet& active, int penalties) {
   return false;
 }
 
+template <class Model>
+bool Newton<Model>::factor_stable(const ActiveSet& active, int penalties) {
+  return factor_penalized(active, penalties) && qp_.is_stable(problem, kkt_, active);
+}
+
 // The same, with damping as the last resort: it shortens the step.
 template <class Model>
 bool Newton<Model>::factor_convexified(const ActiveSet& active, int penalties) {
-  return factor_penalized(active, penalties) || factor_damped();
+  return factor_stable(active, penalties) || factor_damped(active);
 }
 
 // Factors with growing damping, from a little less than was needed last.
 template <class Model>
-bool Newton<Model>::factor_damped() {
+bool Newton<Model>::factor_damped(const ActiveSet& active) {
   damping_ = std::max(kDamping * kkt_.max_curvature(), needed_damping_ / (kDampingGrowth * kDampingGrowth));
   for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
-    if (kkt_.factor(damping_)) {
+    if (kkt_.factor(damping_) && qp_.is_stable(problem, kkt_, active)) {
       needed_damping_ = damping_;
       return true;
     }
+  return false;
+}
+
+// Factors with so much more damping that H is positive definite.
+template <class Model>
+bool Newton<Model>::factor_definite() {
+  damping_ = std::max(damping_, kDamping * kkt_.max_curvature());
+  for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
+    if (kkt_.factor(damping_) && kkt_.negative == 0) {
+      needed_damping_ = damping_;
+      return true;
+    }
+  return false;
+}
+
+// Factors the metric of `restore`, which is positive definite.
+template <class Model>
+bool Newton<Model>::factor_metric() {
+  double damping = damping_ + kNormDamping * kkt_.max_curvature();
+  for (int attempt = 0; attempt < kDampingTries; ++attempt, damping *= kDampingGrowth)
+    if (kkt_.factor(damping) && kkt_.negative == 0) return true;
   return false;
 }
 
@@ -152,7 +183,7 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
   for (; result.iterations <= kNewtonIterations; ++result.iterations) {
     problem.reduced_gradient(at.active);
     if (is_equilibrium(at.active)) {
-      result.converged = stable || factor_penalized(at.active, kPenalties);
+      result.converged = stable || factor_stable(at.active, kPenalties);
       return result;
     }
     ActiveSet target = at.active;
@@ -166,9 +197,12 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
       }
       target = at.active;
     }
-    stable = factor_penalized(at.active, kPenalties);
-    if (!stable && (result.iterations >= damped || !factor_damped())) return result;
-    if (!qp_.solve(problem, kkt_, target, step_)) return result;
+    stable = factor_penalized(at.active, kPenalties) && qp_.solve(problem, kkt_, target, step_);
+    if (!stable) {
+      target = at.active;
+      if (result.iterations >= damped || !factor_damped(target) || !qp_.solve(problem, kkt_, target, step_))
+        return result;
+    }
 
     step_size_ = step_size(step_);
     const double scale = line_search(at, target, weight);
@@ -189,8 +223,7 @@ bool Newton<Model>::set_metric(const Iterate& at) {
   creeping_ = false;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
-  return factor_convexified(at.active, kDescentPenalties) &&
-         kkt_.factor(damping_ + kNormDamping * kkt_.max_curvature());
+  return factor_convexified(at.active, kDescentPenalties) && factor_metric();
 }
 
 template <class Model>
@@ -232,10 +265,13 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
   problem.reduced_gradient(at.active);
-  result.converged = is_equilibrium(at.active) && factor_penalized(at.active, kPenalties);
+  result.converged = is_equilibrium(at.active) && factor_stable(at.active, kPenalties);
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
   ActiveSet target = at.active;
-  if (!qp_.solve(problem, kkt_, target, step_)) return result;
+  if (!qp_.solve(problem, kkt_, target, step_)) {  // not stable without a gap that it drops
+    target = at.active;
+    if (!Model::kRod || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
+  }
   // Closing gaps that are open within the tolerance may cost energy: λ times the gap.
   const double before = problem.energy();
   double allowed = before + kEnergyRoundoff * before;
@@ -250,7 +286,7 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   double scale = farthest;
   // The norm of restorations: near a fold the energy hardly resists the motion that ends the branch, so damping is
   // added.
-  if (!kkt_.factor(damping_ + kNormDamping * kkt_.max_curvature())) return result;
+  if (!factor_metric()) return result;
   for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= scale > 2 * whole ? kStretch : 2) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap with a multiplier
     advance(at, scale, step_, trial_);

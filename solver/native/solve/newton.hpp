@@ -46,8 +46,11 @@ class Newton {
   ActiveSet closed_contacts(const ActiveSet& active) const;
   bool gaps_closed(const ActiveSet& active, double tolerance) const;
   bool factor_penalized(const ActiveSet& active, int penalties);
+  bool factor_stable(const ActiveSet& active, int penalties);
   bool factor_convexified(const ActiveSet& active, int penalties);
-  bool factor_damped();
+  bool factor_damped(const ActiveSet& active);
+  bool factor_definite();
+  bool factor_metric();
   double step_size(const Direction<Model>& step) const;
   double merit(double weight) const;
   double line_search(const Iterate& at, const ActiveSet& target, double& weight);
