@@ -6,6 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
+import sysconfig
 import time
 from pathlib import Path
 
@@ -130,8 +131,11 @@ def test_another_projects_solver_is_named(tmp_path):
     (tmp_path / "solver.py").write_text("raise SystemExit('imported')")
     root = Path(cli.__file__).parents[1]
     code = "import sys; from agents.cli import main; sys.argv = ['ccr-gym', 'bench']; main()"
-    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, cwd=tmp_path)
+    folders = map(str, (tmp_path, root, sysconfig.get_path("purelib")))
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
+    ran = subprocess.run(
+        [sys.executable, "-S", "-c", code], capture_output=True, text=True, env=environment, cwd=tmp_path
+    )
     assert ran.returncode == cli.FAILED
     assert_one_line(
         ran.returncode, ran.stderr.splitlines(), "'solver'", str(tmp_path / "solver.py"), "environment of its own"
