@@ -70,7 +70,7 @@ class Student:
         self.network, self.statistics = network, RunningMeanStd(epsilon=EPSILON, shape=(inputs,))
 
     def normalized(self, rows: np.ndarray) -> torch.Tensor:
-        """Return rows as the network takes them."""
+        """Return rows of observations, normalised for the network."""
         return normalized(rows, self.statistics.mean, standard_deviation(self.statistics))
 
     def predict(

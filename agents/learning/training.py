@@ -67,7 +67,7 @@ def _start(config: TrainConfig) -> TrainingRun:
 
 
 class Validation(EvalCallback):
-    """Measures the mean return on training scenes that are not trained on, at even intervals.
+    """Measures the mean return on scenes of the training split kept out of training, at even intervals.
 
     Args:
         run: The run, whose progress receives the learning curve.

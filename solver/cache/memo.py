@@ -24,6 +24,14 @@ Command = ParamSpec("Command")
 class Stepper(Protocol[StateT, Command]):
     """A solver, in the plane or in space."""
 
+    @property
+    def robot(self) -> object:
+        """The robot."""
+
+    @property
+    def scene(self) -> object:
+        """The obstacles."""
+
     def rest(self) -> StateT:
         """Return the straight, unactuated robot."""
 
@@ -68,6 +76,7 @@ class TransitionMemo(Generic[StateT, Command]):
         if not isinstance(solver, Stepper):
             raise TypeError(f"solver is {shown(solver)}; it must be a solver: it needs rest(), step(), check_command()")
         self._solver = solver
+        self.robot, self.scene = solver.robot, solver.scene
         self._capacity = check_whole("capacity", capacity, 1, 2**31)
         self.clear()
 

@@ -56,7 +56,7 @@ def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None
     for obstacle in scene:
         if obstacle.space != model.space:
             names = ("the plane", "solver.spatial") if model.space == 3 else ("space", "solver")
-            raise ValueError(f"{shown(obstacle)} is an obstacle of {names[0]}; give one of {names[1]}")
+            raise ValueError(f"{shown(obstacle)} is an obstacle of {names[0]}; take one from the package {names[1]}")
         obstacle.check_proportion(robot.longest_mm)
         if obstacle.spring is not None:
             _check_spring(robot, obstacle.spring_matrix)

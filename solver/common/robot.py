@@ -119,12 +119,12 @@ def check_point_count(robot: AnyRobot, count: int) -> None:
     if count > MAX_POINTS:
         raise ValueError(
             f"segments is {robot.segments} and between is {robot.between}; with {len(robot.touch)} kinds of lines in "
-            f"touch these are {count} points that can touch, and at most {MAX_POINTS} are allowed: divide less finely"
+            f"touch these are {count} points that can touch, and at most {MAX_POINTS} are allowed: lower either"
         )
 
 
 def check_cable_limit(robot: AnyRobot, default: float) -> None:
-    """Fill in the largest cable displacement, and check that it is a number that matters.
+    """Fill in the largest cable displacement, and check that it is not negligible.
 
     Raises:
         ValueError: Naming the value and the bound.

@@ -58,7 +58,7 @@ class Equilibrium(BaseEquilibrium[Robot]):
 
     @property
     def slack_mm(self) -> float:
-        """Excess length of the cable over its way through the disks [mm]; zero except for a rod with a slack cable."""
+        """Excess length of the cable over its path through the disks [mm]; zero unless a rod's cable is slack."""
         return self.length_mm - self.cable_mm - float(np.hypot(*np.diff(self.cable_nodes, axis=0).T).sum())
 
     @property

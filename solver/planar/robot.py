@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 from solver.common.robot import OFFSETS, check_cable_limit, check_fields, check_point_count, check_proportions
 from solver.common.validation import check_number, check_positive, check_sequence, refusal
@@ -100,13 +100,20 @@ class Robot:
             )
 
     @classmethod
-    def prototype(cls, *, max_tension: float = 15.0, segments: int = 18) -> "Robot":
+    def prototype(cls, **changes: Any) -> "Robot":
         """Return the paper's 3-D printed prototype: 180 mm, a = 8 mm, 18 segments.
 
         The paper gives no rigidity. 5000 N·mm² is an assumption of this project: a cable load of 350 gf then displaces
         the cable of the free robot by about 8 mm.
+
+        Args:
+            **changes: Fields of the robot that are to be others, such as ``model="rod"``.
+
+        Raises:
+            ValueError: As the robot.
+            TypeError: If a field is none of the robot's.
         """
-        return cls(length_mm=180.0, segments=segments, offset_mm=8.0, max_tension=max_tension)
+        return cls(**{"length_mm": 180.0, "segments": 18, "offset_mm": 8.0, **changes})
 
     def at(self, length_mm: float) -> "Robot":
         """Return the same robot, inserted to a length at rest [mm].

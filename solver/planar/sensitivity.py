@@ -67,7 +67,7 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
             cannot all be closed at once.
         TypeError: If ``equilibrium`` is not one of the plane.
     """
-    check_instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
+    check_instance("equilibrium", equilibrium, Equilibrium, "for one in space call solver.spatial.spatial_sensitivity")
     robot, scene = equilibrium.robot, equilibrium.scene
     if robot.model == "paper" and not equilibrium.cable_mm > 0:
         raise ValueError(f"cable_mm is {equilibrium.cable_mm}; it must be positive, for the shear to be determined")

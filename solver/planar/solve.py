@@ -57,7 +57,7 @@ class Solver:
                 are changed at proportional rates.
 
         Returns:
-            The equilibrium reached; its ``status`` tells how. While anything touches, the cable of the paper's model is
+            The equilibrium reached; its ``status`` says how. While anything touches, the cable of the paper's model is
             not slackened below a pretension of 0.00625 of ``robot.offset_mm``, where the shape would be undetermined;
             a slack robot that is inserted into an obstacle ends in ``GAVE_UP``.
 

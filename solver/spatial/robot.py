@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -74,9 +75,17 @@ class SpatialRobot:
             )
 
     @classmethod
-    def prototype(cls, *, segments: int = 18, angle: float = math.pi / 2, max_tension: float = 15.0) -> "SpatialRobot":
-        """Return the paper's prototype with a second cable; for its rigidity see :meth:`solver.Robot.prototype`."""
-        return cls(length_mm=180.0, segments=segments, offset_mm=8.0, angle=angle, max_tension=max_tension)
+    def prototype(cls, **changes: Any) -> "SpatialRobot":
+        """Return the paper's prototype with a second cable; for its rigidity see :meth:`solver.Robot.prototype`.
+
+        Args:
+            **changes: Fields of the robot that are to be others, such as ``angle=2.09``.
+
+        Raises:
+            ValueError: As the robot.
+            TypeError: If a field is none of the robot's.
+        """
+        return cls(**{"length_mm": 180.0, "segments": 18, "offset_mm": 8.0, **changes})
 
     @property
     def cable_limit_mm(self) -> float:

@@ -47,7 +47,7 @@ class SpatialSolver:
     def step(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> SpatialEquilibrium:
         """Move both pairs of cables to displacements, at proportional rates, as far as tension and obstacles allow.
 
-        A cable whose tension reaches the limit stops there, and the other goes on alone.
+        A cable whose tension reaches the limit stops there, while the other moves on.
 
         Args:
             equilibrium: State to start from, of this solver or one of an equal robot and scene.
@@ -55,7 +55,7 @@ class SpatialSolver:
                 cable of the pair that is pulled.
 
         Returns:
-            The equilibrium reached; its ``status`` tells how. While anything touches, the cables are not slackened
+            The equilibrium reached; its ``status`` says how. While anything touches, the cables are not slackened
             together below a pretension of a/160, where the shape would be undetermined.
 
         Raises:

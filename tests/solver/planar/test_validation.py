@@ -34,7 +34,7 @@ from solver.spatial import SpatialRobot, Sphere
             HalfPlane(point=(30, 0), normal=(-1, 0), nodes=(19,)),
             "HalfPlane names node 19; the robot's nodes are 0 to 18",
         ),
-        (Sphere(center=(50, 0, 100), radius=15), "Sphere.* is an obstacle of space; give one of solver"),
+        (Sphere(center=(50, 0, 100), radius=15), "Sphere.* is an obstacle of space; take one from the package solver"),
         (
             Circle(center=(1e9, 0), radius=50),
             "center of Circle.* is .* mm from the base, beyond 18000 mm.*HalfPlane",

@@ -60,7 +60,10 @@ def test_angles_that_are_taken(angle):
 @pytest.mark.parametrize(
     ("obstacle", "message"),
     [
-        (Circle(center=(50, 110), radius=15), "Circle.* is an obstacle of the plane; give one of solver.spatial"),
+        (
+            Circle(center=(50, 110), radius=15),
+            "Circle.* is an obstacle of the plane; take one from the package solver.spatial",
+        ),
         (
             Sphere(center=(1e9, 0, 0), radius=15),
             "center of Sphere.* mm from the base, beyond 18000 mm.*HalfSpace",
