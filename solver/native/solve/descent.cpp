@@ -14,6 +14,7 @@ using namespace tolerances;
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command) {
   const bool motor_holds = !only_releases(command);
+  const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
   descent_points_ = points_;
   descent_mounts_ = mounts_;
@@ -29,21 +30,21 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
     folded = !finished && problem_.in_barrier();
     if (!ended) continue;
     if (folded && !try_newton()) break;
-    return finish_descent(motor_holds);
+    return finish_descent(motor_holds, held);
   }
   result_.reason = work_is_spent() ? Reason::kWork : folded ? Reason::kFolded : Reason::kStuck;
   return undo_descent(End::kStuck);
 }
 
 template <class Model>
-ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool motor_holds) {
+ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool motor_holds, bool held) {
   problem_.enable_barrier(false);
   present_evaluated_ = false;
   clear_trend();
   evaluate_present();
   if (highest(tensions_) > problem_.robot().max_tension) {
     if (motor_holds) return undo_descent(End::kOverTension);
-    keep_last_held(descent_start_);
+    if (held) keep_last_held(descent_start_);
   }
   double farthest = 0;
   for (std::size_t k = 0; k < points_.size(); ++k)

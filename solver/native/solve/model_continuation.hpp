@@ -122,7 +122,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
   // The descent after the end of a branch.
   End descend_from_end(const Command& command);
-  End finish_descent(bool motor_holds);
+  End finish_descent(bool motor_holds, bool held);
   End undo_descent(End end);
   bool leave_towards(const Command& command);
   bool restore_at(const Command& command, bool holding);

@@ -1,6 +1,8 @@
 """Cases in space that went wrong once, with the values that other ways to the same command give."""
 
+import json
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,3 +68,15 @@ def test_large_steps_end_where_small_ones_do(center, radius, cables):
             assert state.status is Status.CONVERGED
         ends.append(state.nodes)
     assert ends[1:] == [pytest.approx(ends[0], abs=1e-6)] * len(ends[1:])
+
+
+def test_a_motor_never_ends_above_its_limit_where_a_release_snaps_twice():
+    """What is kept of a step that ends above the limit is the last state that the motor held, not one before a snap."""
+    recorded = json.loads((Path(__file__).parents[2] / "data" / "spatial_yield.json").read_text())
+    robot = SpatialRobot.prototype(between=1)
+    spheres = [Sphere(center=(x, y, z), radius=radius) for x, y, z, radius in recorded["spheres"]]
+    solver = SpatialSolver(robot, Scene(spheres))
+    state = solver.rest()
+    for cables in recorded["commands_mm"]:
+        state = solver.step(state, cables)
+        assert state.tensions.max() <= robot.max_tension
