@@ -226,7 +226,7 @@ def measure(steps: int, rivals: int) -> JsonObject:
         "ipopt_ratio": float(np.median(reference / kernel)),
         "segments_mean_us": {str(n): mean for n, mean in means.items()},
         "growth_exponent": float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0]),
-        "sliding_ratio": cost([PUSHED], model="rod"),
+        "rod_ratio": cost([PUSHED], model="rod"),
         "obstacles_ratio": {str(n): cost([PUSHED, *FAR[: n - 1]]) for n in (2, 11, 32)},
         "spring_ratio": cost([SPRUNG]),
         "cold_ratio": cold_ratio(),

@@ -130,10 +130,11 @@ def segment_function() -> ca.Function:
 
 
 def arc_function() -> ca.Function:
-    """``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''`` of a segment that is an arc, for a sliding cable.
+    """Return the segment law of the rod, whose segments are arcs, with its derivatives in the angle.
 
-    The chord ``c = l0 sinc θ/2`` along the bisector has the components ``l0·(f, g)`` in the frame of the lower disk,
-    ahead and to its left; ``s = l0 − c + 2a sin θ/2`` is what the segment takes from the cable (Rao 2024).
+    ``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''``. The chord ``c = l0 sinc θ/2`` along the bisector
+    has the components ``l0·(f, g)`` in the frame of the lower disk, ahead and to its left;
+    ``s = l0 − c + 2a sin θ/2`` is the cable displacement that the segment takes up (Rao 2024).
     """
     angle, length, offset = (ca.SX.sym(name) for name in ("angle", "length", "offset"))
     half = angle / 2

@@ -70,10 +70,10 @@ class Planar {
   double free_slack_multiplier() const requires(kRod) { return 2 * free_control_[0] / free_bend_[0].taken_slope; }
   Vec<kTip> free_slopes(const Command<1>& command);
 
-  // What bending takes from a sliding cable beyond what is pulled [mm], and minus its slope in every control.
+  // Cable taken up by the bending beyond the displacement [mm], and minus its gradient in the controls.
   double slack(const Command<1>& command) const requires(kRod) { return taken_ - command.cables[0]; }
   const std::vector<Control>& minus_slack_slopes() const requires(kRod) { return minus_taken_slopes_; }
-  // Adds the slack with a multiplier to the Lagrangian; follows adjoin.
+  // Adds the slack with a multiplier to the Lagrangian; follows propagate_adjoints.
   void add_slack(double multiplier) requires(kRod);
   DiskGap disk_gap(int segment, int side) const requires(kRod);  // side 1 is that of the cable, -1 the other
   // Sine of the shear angle at which a segment folds over.
