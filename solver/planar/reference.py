@@ -33,7 +33,7 @@ from solver.planar.formulation import node_derivatives, node_problem, robot_ineq
 from solver.planar.free import free_angle, free_tension, tip_slopes
 from solver.planar.layout import layout
 from solver.planar.robot import Robot
-from solver.planar.solve import check_command
+from solver.planar.solve import CommandCheck
 
 
 class _Point(NamedTuple):
@@ -56,7 +56,7 @@ class _Pose(NamedTuple):
     coordinates: np.ndarray
 
 
-class ReferenceSolver:
+class ReferenceSolver(CommandCheck):
     """Follows the same equilibria as :class:`solver.Solver`, by solving the problem as the paper states it.
 
     It only follows a branch: where the branch ends, a step is ``GAVE_UP``.
@@ -189,17 +189,6 @@ class ReferenceSolver:
         balance = gap_slopes.T @ multipliers - slope.ravel()
         tensions = np.linalg.lstsq(equality_slopes.T, balance, rcond=None)[0]
         return _Point(cable, length, unknowns, np.concatenate([tensions, -multipliers]))
-
-    def check_command(
-        self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
-    ) -> tuple[float, float]:
-        """Return a command as floats, like :meth:`solver.Solver.check_command`.
-
-        Raises:
-            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is not one of the plane.
-        """
-        return check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
 
     def _start(self, equilibrium: Equilibrium) -> _Point:
         """Return an equilibrium as a solution of the node problem."""

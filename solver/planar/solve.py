@@ -15,7 +15,31 @@ from solver.planar.layout import layout, layout_model
 from solver.planar.robot import Robot
 
 
-class Solver:
+class CommandCheck:
+    """Checks the commands of a solver in the plane, whatever it solves by."""
+
+    robot: Robot
+    scene: Scene
+
+    def check_command(
+        self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
+    ) -> tuple[float, float]:
+        """Return a command as floats, with the present length where none is given.
+
+        Raises:
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is not one of the plane.
+        """
+        limit = self.robot.cable_limit_mm
+        if not (type(cable_mm) is float and 0 < cable_mm <= limit):
+            cable_mm = check_number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+        check_origin(self.robot, self.scene, equilibrium, Equilibrium)
+        if length_mm is None:
+            return cable_mm, equilibrium.length_mm
+        return cable_mm, self.robot.check_length(length_mm)
+
+
+class Solver(CommandCheck):
     """Follows the equilibria of a robot among obstacles as its cable is pulled and released (eq. 5).
 
     The equilibrium reached depends on the way there, so the present one is an argument of every step and the solver
@@ -88,17 +112,6 @@ class Solver:
         check_origin(self.robot, self.scene, equilibrium, Equilibrium)
         return Optimality(*self._kernel.optimality(equilibrium.block))
 
-    def check_command(
-        self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
-    ) -> tuple[float, float]:
-        """Return a command as floats, with the present length where none is given.
-
-        Raises:
-            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is not one of the plane.
-        """
-        return check_command(self.robot, self.scene, equilibrium, cable_mm, length_mm)
-
     def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
         reached = np.empty_like(block)
         work = self._kernel.step(block, cable_mm, length_mm, reached)
@@ -131,21 +144,3 @@ def kernel_scene(robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:
         RuntimeError: If a custom shape cannot be compiled.
     """
     return [_kernel.Obstacle(**obstacle) for obstacle in kernel_obstacles(robot, scene)]
-
-
-def check_command(
-    robot: Robot, scene: Scene, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None
-) -> tuple[float, float]:
-    """Return a command as floats, after checking it and the equilibrium it starts from.
-
-    Raises:
-        ValueError: If a command is out of range, or the equilibrium is another robot's or scene's.
-        TypeError: If the equilibrium is not one of the plane.
-    """
-    limit = robot.cable_limit_mm
-    if not (type(cable_mm) is float and 0 < cable_mm <= limit):
-        cable_mm = check_number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
-    check_origin(robot, scene, equilibrium, Equilibrium)
-    if length_mm is None:
-        return cable_mm, equilibrium.length_mm
-    return cable_mm, robot.check_length(length_mm)

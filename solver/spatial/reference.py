@@ -14,10 +14,10 @@ from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import node_problem
 from solver.spatial.robot import SpatialRobot, sides
-from solver.spatial.solve import check_cables
+from solver.spatial.solve import SpatialCommandCheck
 
 
-class SpatialReferenceSolver:
+class SpatialReferenceSolver(SpatialCommandCheck):
     """Follows the equilibria of :class:`solver.spatial.SpatialSolver`, by solving the problem as the paper states it.
 
     It only follows a branch: where the branch ends, a step is ``GAVE_UP``. Tensions are reported, but not limited.
@@ -68,7 +68,7 @@ class SpatialReferenceSolver:
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
-        target = check_cables(self.robot, self.scene, equilibrium, cables_mm)
+        target = np.array(self.check_command(equilibrium, cables_mm))
         offset = self.robot.offset_mm
         now, largest, smallest = equilibrium, LARGEST_STEP * offset, SMALLEST_STEP * offset
         while (distance := np.abs(target - now.cables_mm).max()) > 0:
@@ -81,17 +81,6 @@ class SpatialReferenceSolver:
             else:
                 return SpatialEquilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.GAVE_UP, 0)
         return now
-
-    def check_command(
-        self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
-    ) -> tuple[float, ...]:
-        """Return a command as floats, like :meth:`solver.spatial.SpatialSolver.check_command`.
-
-        Raises:
-            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is not one in space.
-        """
-        return tuple(check_cables(self.robot, self.scene, equilibrium, cables_mm).tolist())
 
     def _solve(self, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialEquilibrium | None:
         """Return the solution for another command, ``None`` where IPOPT does not converge or leaves the branch."""

@@ -14,7 +14,34 @@ from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout
 from solver.spatial.robot import SpatialRobot
 
 
-class SpatialSolver:
+class SpatialCommandCheck:
+    """Checks the commands of a solver in space, whatever it solves by."""
+
+    robot: SpatialRobot
+    scene: Scene
+
+    def check_command(
+        self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
+    ) -> tuple[float, ...]:
+        """Return a command as two floats.
+
+        Raises:
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            TypeError: If ``equilibrium`` is not one in space.
+        """
+        limit = self.robot.cable_limit_mm
+        bound = f"a pair, both within ±{limit:.6g} (robot.max_cable_mm)"
+        cables = [
+            check_number("an entry of cables_mm", cable, -limit, limit, bound)
+            for cable in check_sequence("cables_mm", cables_mm, bound)
+        ]
+        if len(cables) != 2:
+            raise refusal("cables_mm", cables_mm, bound)
+        check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
+        return tuple(cables)
+
+
+class SpatialSolver(SpatialCommandCheck):
     """Follows the equilibria of a robot among obstacles in space as its cables are pulled and released (eq. 13).
 
     The equilibrium reached depends on the way there, so the present one is an argument of every step and the solver
@@ -62,7 +89,7 @@ class SpatialSolver:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one in space.
         """
-        cables = check_cables(self.robot, self.scene, equilibrium, cables_mm)
+        cables = np.array(self.check_command(equilibrium, cables_mm))
         return self._follow(equilibrium.block, cables)
 
     def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> Trace:
@@ -71,7 +98,7 @@ class SpatialSolver:
         Raises:
             ValueError: As :meth:`step`.
         """
-        cables = check_cables(self.robot, self.scene, equilibrium, cables_mm)
+        cables = np.array(self.check_command(equilibrium, cables_mm))
         shapes = self._kernel.trace(equilibrium.block, (*cables, self.robot.length_mm))
         return read_trace(shapes, self.robot, self.scene, 3)
 
@@ -83,17 +110,6 @@ class SpatialSolver:
         """
         check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
         return Optimality(*self._kernel.optimality(equilibrium.block))
-
-    def check_command(
-        self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
-    ) -> tuple[float, ...]:
-        """Return a command as floats.
-
-        Raises:
-            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
-            TypeError: If ``equilibrium`` is not one in space.
-        """
-        return tuple(check_cables(self.robot, self.scene, equilibrium, cables_mm).tolist())
 
     def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
         reached = np.empty_like(block)
@@ -127,24 +143,3 @@ def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObsta
         ValueError: If an obstacle names a node that the robot does not have.
     """
     return [_kernel.SpatialObstacle(**obstacle) for obstacle in kernel_obstacles(robot, scene)]
-
-
-def check_cables(
-    robot: SpatialRobot, scene: Scene, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
-) -> np.ndarray:
-    """Return a command as an array ``(2,)``, after checking it and the equilibrium it starts from.
-
-    Raises:
-        ValueError: If a command is out of range, or the equilibrium is another robot's or scene's.
-        TypeError: If the equilibrium is not one in space.
-    """
-    limit = robot.cable_limit_mm
-    bound = f"a pair, both within ±{limit:.6g} (robot.max_cable_mm)"
-    cables = [
-        check_number("an entry of cables_mm", cable, -limit, limit, bound)
-        for cable in check_sequence("cables_mm", cables_mm, bound)
-    ]
-    if len(cables) != 2:
-        raise refusal("cables_mm", cables_mm, bound)
-    check_origin(robot, scene, equilibrium, SpatialEquilibrium)
-    return np.array(cables)
