@@ -12,6 +12,7 @@ for name in ("solver", "solver.spatial"):  # whose __init__ needs the kernel, wh
 
 from solver.common.gap_laws import clearance_function, gap_function  # noqa: E402
 from solver.planar.formulation import GAP_LAWS, arc_function, disk_gap_function, segment_function  # noqa: E402
+from solver.spatial import arc  # noqa: E402
 from solver.spatial import formulation as spatial  # noqa: E402
 
 
@@ -26,7 +27,8 @@ def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     in_space = [spatial.closure_function(), spatial.bend_function(), spatial.hessian_contraction_function()]
-    generate("segment_laws", [segment_function(), arc_function(), *in_space], folder)
+    of_rods = [arc_function(), arc.arc_function(), arc.cable_function(), arc.arc_hessian_function()]
+    generate("segment_laws", [segment_function(), *of_rods, *in_space], folder)
     generate("disk_laws", [disk_gap_function()], folder)
     kinds = (*GAP_LAWS, *spatial.GAP_LAWS)
     generate("gap_laws", [function(law) for law in kinds for function in (gap_function, clearance_function)], folder)

@@ -33,25 +33,12 @@ void bind_kernel(nb::module_& m, const char* name) {
            "Return every shape accepted on the way, three numbers of each node, the points that can touch and the "
            "displacements of the obstacles, and why the step was given up.")
       .def("optimality", &Kernel<D>::optimality, "block"_a,
-           "Return stationarity, gap and complementarity, without units.");
-  constexpr const char* doc =
-      "Follow the branch from one block to a command and write the equilibrium reached to another block. Return "
-      "status, "
-      "iterations and factorizations.";
-  if constexpr (D == 2)
-    kernel.def(
-        "step",
-        [](Kernel<2>& self, const Input& from, double cable, double length, const Output& to) {
-          return self.step(from, {cable, length}, to);
-        },
-        "from_"_a, "cable"_a, "length"_a, "to"_a, doc);
-  else
-    kernel.def(
-        "step",
-        [](Kernel<3>& self, const Input& from, double first, double second, double length, const Output& to) {
-          return self.step(from, {first, second, length}, to);
-        },
-        "from_"_a, "first"_a, "second"_a, "length"_a, "to"_a, doc);
+           "Return stationarity, gap and complementarity, without units.")
+      .def("rest", &Kernel<D>::rest, "length"_a, "to"_a,
+           "Write the equilibrium at a length with no cable displaced. Return status, iterations and factorizations.")
+      .def("step", &Kernel<D>::step, "from_"_a, "command"_a, "to"_a,
+           "Follow the branch from one block to a command, cables and length, and write the equilibrium reached to "
+           "another block. Return status, iterations and factorizations.");
 }
 
 template <int D>
@@ -66,6 +53,8 @@ void bind_batch(nb::module_& m, const char* name) {
           "robot"_a, "count"_a, "obstacles"_a, "threads"_a)
       .def("set_obstacles", &set_obstacles<D>, "robot"_a, "obstacles"_a,
            "Put a robot among other obstacles. Its block stays as it is.")
+      .def("rest", &rest<D>, "robots"_a, "length"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
+           "Bring some robots to rest at a length, in place.")
       .def("step", &step<D>, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Move some robots to their commands, cables and length, in place.")
       .def("optimality", &optimality<D>, "blocks"_a, "found"_a,
@@ -97,9 +86,10 @@ void bind_space(nb::module_& m, const Names& names) {
 
 void bind_enums(nb::module_& m) {
   nb::enum_<ModelKind>(m, "Model", "The model of a robot.")
-      .value("PAPER", ModelKind::kPaper)
-      .value("ROD", ModelKind::kRod)
-      .value("SPATIAL", ModelKind::kSpatial);
+      .value("PLANAR_PAPER", ModelKind::kPlanarPaper)
+      .value("PLANAR_ROD", ModelKind::kPlanarRod)
+      .value("SPATIAL_PAPER", ModelKind::kSpatialPaper)
+      .value("SPATIAL_ROD", ModelKind::kSpatialRod);
   nb::enum_<Status>(m, "Status", nb::is_arithmetic(), "How a step ended.")
       .value("CONVERGED", Status::kConverged)
       .value("SNAPPED", Status::kSnapped)
@@ -135,27 +125,47 @@ void bind_layout(nb::module_& m) {
           nb::sig("def shape(self, /) -> tuple[int, ...]"));
   m.def(
       "block_layout",
-      [](ModelKind model, int segments, int lines, int positions, int obstacles) {
-        return make_block_layout(model,
-                                 {.segments = segments, .lines = lines, .positions = positions, .obstacles = obstacles})
+      [](ModelKind model, int segments, int cables, int lines, int positions, int obstacles) {
+        return make_block_layout(model, {.segments = segments,
+                                         .cables = cables,
+                                         .lines = lines,
+                                         .positions = positions,
+                                         .obstacles = obstacles})
             .fields();
       },
-      "model"_a, "segments"_a, "lines"_a, "positions"_a, "obstacles"_a,
+      "model"_a, "segments"_a, "cables"_a, "lines"_a, "positions"_a, "obstacles"_a,
       "Return the fields of an equilibrium's block, in their order.");
 }
 
 void bind_robot(nb::module_& m) {
+  m.attr("MAX_CABLES") = kMaxCables;
+  nb::class_<Load>(m, "Load", "A dead load on the disk of a node.")
+      .def(
+          "__init__",
+          [](Load* self, int node, const Numbers<2>& at, const Numbers<3>& force, double moment) {
+            new (self) Load{node, {at}, {force}, moment};
+          },
+          nb::kw_only(), "node"_a, "at"_a, "force"_a, "moment"_a);
+  nb::class_<Rod>(m, "Rod", "What a rod has beyond a robot of the paper's model.")
+      .def(nb::init<>())
+      .def(
+          "__init__",
+          [](Rod* self, const std::vector<Numbers<2>>& holes, const std::vector<int>& ends, const Input& stiffness,
+             const Input& rest, const Numbers<3>& weight, const std::vector<Load>& loads, double least_pull) {
+            new (self) Rod(make_rod(holes, ends, stiffness, rest, weight, loads, least_pull));
+          },
+          nb::kw_only(), "holes"_a, "ends"_a, "stiffness"_a, "rest"_a, "weight"_a, "loads"_a, "least_pull"_a);
   nb::class_<Robot>(m, "Robot", "A robot.")
       .def(
           "__init__",
           [](Robot* self, ModelKind model, int segments, double offset, double angle, double rigidity,
              double max_tension, double max_length, double disk_radius, double disk_thickness,
-             const std::vector<Numbers<2>>& lines, const std::vector<double>& edges, int between) {
+             const std::vector<Numbers<2>>& lines, const std::vector<double>& edges, int between, const Rod& rod) {
             new (self) Robot(make_robot(model, segments, offset, angle, rigidity, max_tension, max_length, disk_radius,
-                                        disk_thickness, lines, edges, between));
+                                        disk_thickness, lines, edges, between, rod));
           },
           nb::kw_only(), "model"_a, "segments"_a, "offset"_a, "angle"_a, "rigidity"_a, "max_tension"_a, "max_length"_a,
-          "disk_radius"_a, "disk_thickness"_a, "lines"_a, "edges"_a, "between"_a);
+          "disk_radius"_a, "disk_thickness"_a, "lines"_a, "edges"_a, "between"_a, "rod"_a);
 }
 
 }  // namespace

@@ -57,17 +57,28 @@ class Kernel {
 
   std::size_t block_size() const { return layout_.size; }
 
-  std::tuple<Status, int, int> step(const Input& from, const Numbers<D>& command, const Output& to) {
+  std::tuple<Status, int, int> rest(double length, const Output& to) {
+    require_size(to.size());
+    require(std::isfinite(length) && length > 0, "a length is not finite and positive");
+    const Lease continuation(*this);
+    const StepResult result = continuation->rest(length, to.data());
+    if (result.interrupted) throw nb::python_error();
+    return {result.status, result.iterations, result.factorizations};
+  }
+
+  std::tuple<Status, int, int> step(const Input& from, const std::vector<double>& command, const Output& to) {
     require_block(from);
     require_size(to.size());
+    require_target(command);
     const Lease continuation(*this);
     const StepResult result = continuation->follow(from.data(), command.data(), to.data());
     if (result.interrupted) throw nb::python_error();
     return {result.status, result.iterations, result.factorizations};
   }
 
-  std::tuple<std::vector<double>, Reason> trace(const Input& from, const Numbers<D>& command) {
+  std::tuple<std::vector<double>, Reason> trace(const Input& from, const std::vector<double>& command) {
     require_block(from);
+    require_target(command);
     std::vector<double> shapes, to(block_size());
     const Lease continuation(*this);
     const StepResult result = continuation->trace(from.data(), command.data(), to.data(), shapes);
@@ -107,7 +118,12 @@ class Kernel {
 
   void require_block(const Input& block) const {
     require_size(block.size());
-    require_sound<D>(layout_, block.data());
+    require_sound(layout_, block.data());
+  }
+
+  void require_target(const std::vector<double>& command) const {
+    require(command.size() == layout_.cables.size + 1, "a command must name the displacement of each cable, and length");
+    require_command(command.data(), layout_.cables.size);
   }
 
   void require_size(std::size_t size) const {
@@ -159,9 +175,9 @@ template <int D>
 void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands, const Blocks& blocks,
           const Counts& statuses, const Counts& iterations, const Counts& factorizations) {
   const typename Batch<D>::Lock lock(batch);
-  const std::size_t count = batch.count(), size = batch.layout().size;
+  const std::size_t count = batch.count(), size = batch.layout().size, cables = batch.layout().cables.size;
   require_blocks(batch, blocks);
-  require(commands.shape(0) == count && commands.shape(1) == D,
+  require(commands.shape(0) == count && commands.shape(1) == batch.layout().cables.size + 1,
           "commands must have a row of cables and length for each robot");
   require(statuses.shape(0) == count && iterations.shape(0) == count && factorizations.shape(0) == count,
           "statuses, iterations and factorizations must have a number for each robot");
@@ -170,12 +186,35 @@ void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands
   std::int64_t *status = statuses.data(), *iterated = iterations.data(), *factored = factorizations.data();
   for (const int robot : robots) {
     require_index(batch, robot);
-    require_sound<D>(batch.layout(), block + size * robot);
-    require_command<D>(command + D * robot);
+    require_sound(batch.layout(), block + size * robot);
+    require_command(command + (cables + 1) * robot, cables);
   }
   each(batch, robots, [&](Continuation<D>& continuation, int k) {
     const int i = robots[k];
-    const StepResult result = continuation.follow(block + size * i, command + D * i, block + size * i);
+    const StepResult result = continuation.follow(block + size * i, command + (cables + 1) * i, block + size * i);
+    if (result.interrupted) return;
+    status[i] = static_cast<int>(result.status);
+    iterated[i] = result.iterations;
+    factored[i] = result.factorizations;
+  });
+}
+
+// Brings some robots to rest at a length.
+template <int D>
+void rest(Batch<D>& batch, const std::vector<int>& robots, double length, const Blocks& blocks, const Counts& statuses,
+          const Counts& iterations, const Counts& factorizations) {
+  const typename Batch<D>::Lock lock(batch);
+  require_blocks(batch, blocks);
+  const std::size_t count = batch.count(), size = batch.layout().size;
+  require(statuses.shape(0) == count && iterations.shape(0) == count && factorizations.shape(0) == count,
+          "statuses, iterations and factorizations must have a number for each robot");
+  require(std::isfinite(length) && length > 0, "a length is not finite and positive");
+  for (const int robot : robots) require_index(batch, robot);
+  double* block = blocks.data();
+  std::int64_t *status = statuses.data(), *iterated = iterations.data(), *factored = factorizations.data();
+  each(batch, robots, [&](Continuation<D>& continuation, int k) {
+    const int i = robots[k];
+    const StepResult result = continuation.rest(length, block + size * i);
     if (result.interrupted) return;
     status[i] = static_cast<int>(result.status);
     iterated[i] = result.iterations;
@@ -194,7 +233,7 @@ void optimality(Batch<D>& batch, const Blocks& blocks, const Blocks& found) {
   double* to = found.data();
   std::vector<int> all(batch.count());
   std::iota(all.begin(), all.end(), 0);
-  for (const int i : all) require_sound<D>(batch.layout(), block + size * i);
+  for (const int i : all) require_sound(batch.layout(), block + size * i);
   each(batch, all, [&](Continuation<D>& continuation, int k) {
     const Optimality at = continuation.optimality(block + size * k);
     const double numbers[] = {at.stationarity, at.gap, at.complementarity};
@@ -207,8 +246,8 @@ std::vector<int> ramps_reach_forces(Batch<D>& batch, const std::vector<int>& rob
                                     const Table& directions, double increment, double limit, double length,
                                     const Blocks& reached) {
   const typename Batch<D>::Lock lock(batch);
-  const std::size_t count = robots.size();
-  require(forces.shape(0) == count && directions.shape(0) == count && directions.shape(1) == D - 1 &&
+  const std::size_t count = robots.size(), cables = batch.layout().cables.size;
+  require(forces.shape(0) == count && directions.shape(0) == count && directions.shape(1) == cables &&
               reached.shape(0) == count && reached.shape(1) == D,
           "forces (k), directions (k, cables) and reached (k, d) must have a row for each robot");
   for (const int robot : robots) require_index(batch, robot);
@@ -218,7 +257,7 @@ std::vector<int> ramps_reach_forces(Batch<D>& batch, const std::vector<int>& rob
   each(batch, robots, [&](Continuation<D>& continuation, int k) {
     found[k] = continuation.ramp_reaches_force({.force = force[k],
                                                 .obstacle = obstacle,
-                                                .direction = direction + (D - 1) * k,
+                                                .direction = direction + cables * k,
                                                 .increment = increment,
                                                 .limit = limit,
                                                 .length = length},

@@ -28,17 +28,44 @@ using Counts = nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::
 using Values = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 template <int D>
-using Numbers = std::array<double, D>;  // a command: cables, then length
+using Numbers = std::array<double, D>;
 
 inline void require(bool condition, const std::string& message) {
   if (!condition) throw std::invalid_argument(message);
 }
 
+inline Rod make_rod(const std::vector<Numbers<2>>& holes, const std::vector<int>& ends, const Input& stiffness,
+                    const Input& rest, const Numbers<3>& weight, std::vector<Load> loads, double least_pull) {
+  require(holes.size() == ends.size() && holes.size() <= kMaxCables,
+          "holes and ends must name the same cables, at most " + std::to_string(kMaxCables));
+  Rod rod{.cables = {},
+          .stiffness = {stiffness.data(), stiffness.data() + stiffness.size()},
+          .rest = {rest.data(), rest.data() + rest.size()},
+          .weight = {weight},
+          .loads = std::move(loads),
+          .least_pull = least_pull};
+  for (std::size_t k = 0; k < holes.size(); ++k) rod.cables.push_back({{holes[k]}, ends[k]});
+  return rod;
+}
+
+// Refuses a rod whose cables, segments or loads do not fit its model.
+inline void require_rod(ModelKind model, int segments, const Rod& rod) {
+  if (model == ModelKind::kPlanarPaper || model == ModelKind::kSpatialPaper) return;
+  const std::size_t numbers = static_cast<std::size_t>(segments) * (model == ModelKind::kPlanarRod ? 1 : 3);
+  require(!rod.cables.empty() && rod.stiffness.size() == numbers && rod.rest.size() == numbers,
+          "a rod needs a cable, and stiffness and rest of each control of its segments");
+  const auto on_robot = [&](int node) { return node >= 1 && node <= segments; };
+  for (const Cable& cable : rod.cables) require(on_robot(cable.end), "a cable must end at a node from 1 on");
+  for (const Load& load : rod.loads) require(on_robot(load.node), "a load must act on a node from 1 on");
+}
+
 inline Robot make_robot(ModelKind model, int segments, double offset, double angle, double rigidity, double max_tension,
                         double max_length, double disk_radius, double disk_thickness,
-                        const std::vector<Numbers<2>>& lines, const std::vector<double>& edges, int between) {
+                        const std::vector<Numbers<2>>& lines, const std::vector<double>& edges, int between,
+                        const Rod& rod) {
   require(edges.size() == lines.size() && !lines.empty(),
           "edges must name the longest edge of each line, of one at least");
+  require_rod(model, segments, rod);
   std::vector<Vec<2>> on_disk;
   for (const Numbers<2>& line : lines) on_disk.push_back({line});
   return {.model = model,
@@ -52,7 +79,8 @@ inline Robot make_robot(ModelKind model, int segments, double offset, double ang
           .disk_thickness = disk_thickness,
           .lines = std::move(on_disk),
           .edges = edges,
-          .between = between};
+          .between = between,
+          .rod = rod};
 }
 
 template <int D>
@@ -100,21 +128,17 @@ void require_points(const BlockLayout& layout, const std::vector<Obstacle<D>>& o
             "touchable must have an entry for each point of the robot, " + std::to_string(layout.flags.size));
 }
 
-// Refuses commands that are not finite, and a length that is not positive.
-template <int D>
-void require_command(const double* command) {
-  for (int k = 0; k < D; ++k)
+// Refuses commands that are not finite, and a length, the last number, that is not positive.
+inline void require_command(const double* command, std::size_t cables) {
+  for (std::size_t k = 0; k <= cables; ++k)
     require(std::isfinite(command[k]), "a command, or that in the block of an equilibrium, is not finite");
-  require(command[D - 1] > 0, "a length, or that in the block of an equilibrium, is not positive");
+  require(command[cables] > 0, "a length, or that in the block of an equilibrium, is not positive");
 }
 
 // Refuses blocks that no robot can have: the kernel needs a finite command and a positive length.
-template <int D>
-void require_sound(const BlockLayout& layout, const double* block) {
-  Numbers<D> command;
-  std::copy_n(block + layout.cables.offset, D - 1, command.begin());
-  command[D - 1] = block[layout.length.offset];
-  require_command<D>(command.data());
+inline void require_sound(const BlockLayout& layout, const double* block) {
+  require(layout.length.offset == layout.cables.offset + layout.cables.size, "cables and length stand side by side");
+  require_command(block + layout.cables.offset, layout.cables.size);
 }
 
 }  // namespace ccr::binding

@@ -132,11 +132,11 @@ def segment_function() -> ca.Function:
 def arc_function() -> ca.Function:
     """Return the segment law of the rod, whose segments are arcs, with its derivatives in the angle.
 
-    ``(θ, l0, a) → θ, f, g, c'/c, c''/c, cos θ, sin θ, s, s', s''``. The chord ``c = l0 sinc θ/2`` along the bisector
-    has the components ``l0·(f, g)`` in the frame of the lower disk, ahead and to its left;
-    ``s = l0 − c + 2a sin θ/2`` is the cable displacement that the segment takes up (Rao 2024).
+    ``(θ, l0) → θ, f, g, c'/c, c''/c, cos θ, sin θ, cos θ/2, sin θ/2, s, s', s''``. The chord ``c = l0 sinc θ/2`` along
+    the bisector has the components ``l0·(f, g)`` in the frame of the lower disk, ahead and to its left. From a cable at
+    the distance a towards +x the segment takes up ``s + 2a sin θ/2`` with ``s = l0 − c`` (Rao 2024).
     """
-    angle, length, offset = (ca.SX.sym(name) for name in ("angle", "length", "offset"))
+    angle, length = ca.SX.sym("angle"), ca.SX.sym("length")
     half = angle / 2
     square = half**2
     sinc, first, second = sinc_and_slopes(square)
@@ -150,11 +150,13 @@ def arc_function() -> ca.Function:
         bent_slope / sinc,
         1 - 2 * sine**2,
         2 * sine * cosine,
-        length * (1 - sinc) + 2 * offset * sine,
-        offset * cosine - length * bent,
-        -offset * sine / 2 - length * bent_slope,
+        cosine,
+        sine,
+        length * (1 - sinc),
+        -length * bent,
+        -length * bent_slope,
     )
-    return ca.Function("ccr_arc", [angle, length, offset], [ca.cse(law)])
+    return ca.Function("ccr_arc", [angle, length], [ca.cse(law)])
 
 
 def disk_gap(angle: Symbol, length: Symbol, radius: Symbol, thickness: Symbol) -> Symbol:

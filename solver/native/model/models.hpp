@@ -2,9 +2,11 @@
 #pragma once
 
 #include "model/planar.hpp"
-#include "model/spatial.hpp"
+#include "model/spatial_paper.hpp"
+#include "model/spatial_rod.hpp"
 
 #define CCR_EACH_MODEL(DO)  \
-  DO(ccr::Planar<PaperLaw>) \
-  DO(ccr::Planar<RodLaw>)   \
-  DO(ccr::Spatial)
+  DO(ccr::PlanarPaper)     \
+  DO(ccr::PlanarRod)       \
+  DO(ccr::SpatialPaper)    \
+  DO(ccr::SpatialRod)

@@ -3,11 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/disk_gap.hpp"
 #include "tolerances.hpp"
-
-// The generated law of the disks' gap, inlined here.
-#define CASADI_SYMBOL_EXPORT static inline
-#include "disk_laws.c"
 
 namespace ccr {
 
@@ -36,14 +33,28 @@ Planar<Law>::Planar(const Robot& robot)
       bends_(robot.segments),
       free_bend_(1),
       adjoints_(robot.segments),
-      minus_taken_slopes_(kRod ? robot.segments : 0) {}
+      cables_(robot.rod.cables, robot.segments) {
+  bends_evenly_ = is_bent_evenly();
+}
 
 template <class Law>
-bool Planar<Law>::evaluate(const Command<1>& command, const std::vector<Control>& controls) {
+bool Planar<Law>::is_bent_evenly() const {
+  if (!kRod) return true;
+  const Rod& rod = robot_.rod;
+  const auto all = [](const auto& values, double value) {
+    return std::all_of(values.begin(), values.end(), [&](double other) { return other == value; });
+  };
+  return rod.cables.size() == 1 && rod.cables[0].end == robot_.segments && rod.cables[0].hole[0] == robot_.offset &&
+         all(rod.stiffness, 1) && all(rod.rest, 0) && all(rod.weight.v, 0) && rod.loads.empty();
+}
+
+template <class Law>
+bool Planar<Law>::evaluate(const Command& command, const std::vector<Control>& controls) {
   const int n = robot_.segments;
   displacement_ = command.cables[0] / n;
   length_ = command.length / n;
-  objective = max_objective_slope = widest = taken_ = 0;
+  objective = max_objective_slope = widest = 0;
+  if constexpr (kRod) cables_.clear();
   Law::bend(n, controls[0].v.data(), displacement_, length_, robot_.offset, bends_);
   states[0] = {};
   frames[0] = {{1, 0}};
@@ -60,11 +71,19 @@ bool Planar<Law>::evaluate(const Command<1>& command, const std::vector<Control>
     next[1] += dy;
     next[2] -= bend.angle;
     if constexpr (kRod) {
-      taken_ += bend.taken;
-      minus_taken_slopes_[i][0] = -bend.taken_slope;
+      for (int k = 0; k < cables_.count(); ++k)
+        if (cables_.spans(k, i)) {
+          const auto taken = Law::taken(bend, cables_[k].hole[0]);
+          cables_.take(k, i, taken.value, {{taken.slope}});
+        }
+      const double stiffness = robot_.rod.stiffness[i], strain = bend.angle - robot_.rod.rest[i];
+      objective += stiffness * strain * strain;
+      const double largest = 2 * stiffness * std::max(std::abs(bend.angle), std::abs(strain));
+      max_objective_slope = std::max(max_objective_slope, largest);
+    } else {
+      objective += bend.angle * bend.angle;
+      max_objective_slope = std::max(max_objective_slope, std::abs(2 * bend.angle * bend.slope));
     }
-    objective += bend.angle * bend.angle;
-    max_objective_slope = std::max(max_objective_slope, std::abs(2 * bend.angle * bend.slope));
     widest = std::max(widest, std::abs(bend.angle));
   }
   return std::isfinite(objective) && !(kRod && widest > tolerances::kWidestTurn);
@@ -78,17 +97,22 @@ void Planar<Law>::propagate_adjoints(const std::vector<State>& node_forces) {
     p -= node_forces[i + 1];
     adjoints_[i] = p;
     const double turn = turning(p, bend);
-    gradient[i][0] = 2 * bend.angle * bend.slope + turn * bend.heading_slope - p[2] * bend.slope;
+    double slope = 2 * bend.angle * bend.slope;
+    if constexpr (kRod) slope = 2 * robot_.rod.stiffness[i] * (bend.angle - robot_.rod.rest[i]);
+    gradient[i][0] = slope + turn * bend.heading_slope - p[2] * bend.slope;
     if constexpr (kRod) gradient[i][0] -= inward(p, bend) * bend.stretch;
     p[2] += turn;
   }
-  slack_multiplier_ = 0;
 }
 
-template <class Cable>
-void Planar<Cable>::add_slack(double multiplier) requires(kRod) {
-  slack_multiplier_ = multiplier;
-  for (int i = 0; i < robot_.segments; ++i) gradient[i][0] += multiplier * minus_taken_slopes_[i][0];
+template <class Law>
+double Planar<Law>::slack_curvature(int segment) const {
+  double curvature = 0;
+  if constexpr (kRod)
+    for (int k = 0; k < cables_.count(); ++k)
+      if (cables_.spans(k, segment))
+        curvature += cables_.multipliers()[k] * Law::taken(bends_[segment], cables_[k].hole[0]).curvature;
+  return curvature;
 }
 
 template <class Law>
@@ -105,23 +129,23 @@ void Planar<Law>::lagrangian_hessian(System& system) const {
     system.node_hessian[i] = {};
     system.node_hessian[i](2, 2) = inward;
     stage.hux = {{0, 0, inward * heading}};
-    stage.huu = {{2 * (bend.slope * bend.slope + bend.angle * bend.curvature) + inward * heading * heading +
-                  turn * bend.heading_curvature - p[2] * bend.curvature}};
+    double curvature = 2 * (bend.slope * bend.slope + bend.angle * bend.curvature);
+    if constexpr (kRod) curvature = 2 * robot_.rod.stiffness[i];
+    stage.huu = {{curvature + inward * heading * heading + turn * bend.heading_curvature - p[2] * bend.curvature}};
     if constexpr (kRod) {
       stage.b[0] += bend.dx * bend.stretch;
       stage.b[1] += bend.dy * bend.stretch;
       stage.hux[2] += turn * bend.stretch;
-      stage.huu[0] +=
-          2 * turn * bend.stretch * heading - inward * bend.stretch_slope - slack_multiplier_ * bend.taken_curvature;
+      stage.huu[0] += 2 * turn * bend.stretch * heading - inward * bend.stretch_slope - slack_curvature(i);
     }
   }
   system.node_hessian[robot_.segments] = {};
 }
 
-// For the rod the tension is the multiplier of the slack, and this is 0.
+// For the rod the tensions are the multipliers of the slacks, and this is 0.
 template <class Law>
-Vec<1> Planar<Law>::displacement_slopes() const {
-  Vec<1> slope;
+Vec<Planar<Law>::kCables> Planar<Law>::displacement_slopes() const {
+  Vec<kCables> slope;
   if constexpr (!kRod)
     for (int i = 0; i < robot_.segments; ++i) {
       const auto bend = bends_[i];
@@ -134,17 +158,14 @@ Vec<1> Planar<Law>::displacement_slopes() const {
 
 template <class Law>
 DiskGap Planar<Law>::disk_gap(int segment, int side) const requires(kRod) {
-  const double angle = side * bends_[segment].angle;
-  const double* in[] = {&angle, &length_, &robot_.disk_radius, &robot_.disk_thickness};
-  DiskGap gap;
-  double* out[] = {&gap.value};
-  ccr_disk_gap(in, out, nullptr, nullptr, 0);
-  gap.slope *= side;
+  const double sign = side == 0 ? 1 : -1, angle = sign * bends_[segment].angle;
+  DiskGap gap = measure_disk_gap(angle, length_, robot_.disk_radius, robot_.disk_thickness);
+  gap.slope *= sign;
   return gap;
 }
 
 template <class Law>
-Planar<Law>::Control Planar<Law>::free_control(const Command<1>& command) {
+Planar<Law>::Control Planar<Law>::free_control(const Command& command) {
   if (command == free_command_) return free_control_;
   const double displacement = command.cables[0] / robot_.segments, length = command.length / robot_.segments;
   free_command_ = command;
@@ -155,7 +176,8 @@ Planar<Law>::Control Planar<Law>::free_control(const Command<1>& command) {
     if constexpr (!kRod) {
       break;
     } else {
-      const double change = (free_bend_[0].taken - displacement) / free_bend_[0].taken_slope;
+      const auto taken = Law::taken(free_bend_[0], robot_.offset);
+      const double change = (taken.value - displacement) / taken.slope;
       free_control_[0] -= change;
       if (std::abs(change) <= tolerances::kRelaxed * std::abs(free_control_[0])) break;
     }
@@ -163,16 +185,22 @@ Planar<Law>::Control Planar<Law>::free_control(const Command<1>& command) {
   return free_control_;
 }
 
+template <class Law>
+double Planar<Law>::free_slack_multiplier() const requires(kRod) {
+  return 2 * free_control_[0] / Law::taken(free_bend_[0], robot_.offset).slope;
+}
+
 // All segments have the same shape, with chords at angles (i + 1/2) θ, which are reached by repeated rotation.
 template <class Law>
-Vec<3> Planar<Law>::free_slopes(const Command<1>& command) {
+Vec<3> Planar<Law>::free_slopes(const Command& command) {
+  if (!bends_evenly_) return {};
   const int n = robot_.segments;
   const double length = command.length / n;
   free_control(command);
   const auto bend = free_bend_[0];
   double turn, stretch = 0;  // derivatives of θ and of the logarithm of the chord
   if constexpr (kRod) {
-    turn = 1 / (n * bend.taken_slope);
+    turn = 1 / (n * Law::taken(bend, robot_.offset).slope);
     stretch = bend.stretch * turn;
   } else {
     turn = bend.displacement_slope / n;

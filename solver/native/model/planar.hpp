@@ -5,6 +5,7 @@
 
 #include "math/riccati.hpp"
 #include "model/robot.hpp"
+#include "model/rod_cables.hpp"
 #include "model/segment.hpp"
 
 namespace ccr {
@@ -34,15 +35,19 @@ Mat<N, C> transpose_times(const PlanarTransition& a, Mat<N, C> m) {
   return m;
 }
 
-// One cable. `Law` is the model of a segment.
+// `Law` is the model of a segment: that of the paper, with one cable, or that of the rod.
 template <class Law>
 class Planar {
  public:
-  static constexpr int kSpace = 2, kTurn = 1, kControl = 1, kCables = 1;
+  static constexpr int kSpace = 2, kTurn = 1, kControl = 1;
   static constexpr int kShears = 1;  // leading controls that shear a segment
   static constexpr int kState = 3;   // x, y, disk angle
   static constexpr bool kRod = Law::kRod;
-  static constexpr int kTip = 3;  // slopes of the free tip: x, y, angle
+  static constexpr int kCables = kRod ? kMaxCables : 1;
+  static constexpr int kDiskSides = 2;  // on which the disks of a segment can meet: that of +x at rest, and the other
+  static constexpr int kTip = 3;        // slopes of the free tip: x, y, angle
+
+  using Command = ccr::Command<kCables>;
 
   using Control = Vec<kControl>;
   using State = Vec<kState>;
@@ -56,26 +61,34 @@ class Planar {
   }
 
   // Evaluates the shape under a command; false where a control is out of range of the segment law.
-  bool evaluate(const Command<1>& command, const std::vector<Control>& controls);
+  bool evaluate(const Command& command, const std::vector<Control>& controls);
 
   // Computes the adjoints and the gradient of the Lagrangian J - Σ λ c in the controls; `node_forces` is Σ λ ∇c at
   // each node.
   void propagate_adjoints(const std::vector<State>& node_forces);
   // Hessian of the Lagrangian without that of the gaps; follows propagate_adjoints.
   void lagrangian_hessian(System& system) const;
-  Vec<1> displacement_slopes() const;  // of the Lagrangian in the displacement; follows propagate_adjoints
+  Vec<kCables> displacement_slopes() const;  // of the Lagrangian in the displacement; follows propagate_adjoints
 
-  // Control of every segment of the robot that nothing touches, and for the rod the multiplier of the slack.
-  Control free_control(const Command<1>& command);
-  double free_slack_multiplier() const requires(kRod) { return 2 * free_control_[0] / free_bend_[0].taken_slope; }
-  Vec<kTip> free_slopes(const Command<1>& command);
+  // Whether the robot that nothing touches bends alike in all segments, so that its shape is known: a rod does where
+  // one cable bends it and nothing else.
+  bool bends_evenly() const { return bends_evenly_; }
+  // Control of every segment of such a robot, and for the rod the multiplier of the slack.
+  Control free_control(const Command& command);
+  double free_slack_multiplier() const requires(kRod);
+  Vec<kTip> free_slopes(const Command& command);  // zero where the robot does not bend evenly
 
-  // Cable taken up by the bending beyond the displacement [mm], and minus its gradient in the controls.
-  double slack(const Command<1>& command) const requires(kRod) { return taken_ - command.cables[0]; }
-  const std::vector<Control>& minus_slack_slopes() const requires(kRod) { return minus_taken_slopes_; }
-  // Adds the slack with a multiplier to the Lagrangian; follows propagate_adjoints.
-  void add_slack(double multiplier) requires(kRod);
-  DiskGap disk_gap(int segment, int side) const requires(kRod);  // side 1 is that of the cable, -1 the other
+  const RodCables<kControl>& cables() const requires(kRod) { return cables_; }
+  // Adds the slacks with their multipliers to the Lagrangian; follows propagate_adjoints.
+  void add_slacks(const Vec<kCables>& multipliers) requires(kRod) { cables_.set_multipliers(multipliers, gradient); }
+
+  // Where the disks of a segment are closest: on which side, and their gap.
+  double bend(int segment) const requires(kRod) { return bends_[segment].angle; }
+  int disk_side(int segment) const requires(kRod) { return bends_[segment].angle < 0; }
+  DiskGap disk_gap(int segment, int side) const requires(kRod);
+  // Slope of that gap as moments on the lower and upper disk, and its curvature in the control.
+  Vec<1> disk_moment(int segment, const DiskGap& gap) const requires(kRod) { return {{-gap.slope}}; }
+  Mat<1, 1> disk_curvature(int segment, const DiskGap& gap) const requires(kRod) { return {{gap.curvature}}; }
   // Sine of the shear angle at which a segment folds over.
   double widest_shear() const { return kRod ? HUGE_VAL : 1 - displacement_ / length_; }
   double free_turn() const { return displacement_ / robot_.offset; }  // approximate angle of a free segment
@@ -89,15 +102,21 @@ class Planar {
   double widest = 0;               // largest angle between consecutive disks
 
  private:
+  bool is_bent_evenly() const;
+  double slack_curvature(int segment) const;  // of the slacks with their multipliers, in the control
+
   Robot robot_;
+  bool bends_evenly_;
   double displacement_ = 0, length_ = 0;  // of a segment: its share of the cable, its backbone [mm]
   typename Law::Bends bends_;
   typename Law::Bends free_bend_;  // a free segment under the last command of free_control
-  Command<1> free_command_{{{-1}}, 0};
+  Command free_command_{{{-1}}, 0};
   Control free_control_{};
   std::vector<State> adjoints_;  // of the upper state of each segment
-  double taken_ = 0, slack_multiplier_ = 0;
-  std::vector<Control> minus_taken_slopes_;
+  RodCables<kControl> cables_;
 };
+
+using PlanarPaper = Planar<PaperLaw>;
+using PlanarRod = Planar<RodLaw>;
 
 }  // namespace ccr

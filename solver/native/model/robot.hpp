@@ -7,14 +7,40 @@
 
 namespace ccr {
 
-// The model of a segment: in the plane that of the paper or the discrete rod, in space that of the paper (eq. 13).
-enum class ModelKind { kPaper, kRod, kSpatial };
+// The model of the paper (eq. 5 in the plane, eq. 13 in space) or the rod.
+enum class ModelKind { kPlanarPaper, kPlanarRod, kSpatialPaper, kSpatialRod };
+
+inline constexpr int kMaxCables = 12;  // of a rod
+
+// A cable of a rod, from the base to the disk of a node.
+struct Cable {
+  Vec<2> hole;  // where it crosses the disks [mm]
+  int end;      // node of its last disk
+};
+
+// A dead load on the disk of a node: a force at a point of the disk, and in the plane a moment.
+struct Load {
+  int node;
+  Vec<2> at;     // [mm]
+  Vec<3> force;  // in the base frame [N]
+  double moment;  // counter-clockwise [N mm]
+};
+
+// What a rod has beyond a robot of the paper's model. Numbers of segments are one for each control.
+struct Rod {
+  std::vector<Cable> cables;
+  std::vector<double> stiffness;  // EI and GJ of each segment, over the robot's rigidity
+  std::vector<double> rest;       // controls of each segment at rest: its precurvature [rad]
+  Vec<3> weight{};                // of a unit of length, in the base frame [N/mm]
+  std::vector<Load> loads;
+  double least_pull = 0;  // of a cable [mm]
+};
 
 struct Robot {
   ModelKind model;
   int segments;
   double offset;                       // of the cables from the backbone [mm]
-  double angle;                        // from the first cable to the second [rad]
+  double angle;                        // from the first cable to the second, in the paper's model of space [rad]
   double rigidity;                     // EI [N mm^2]
   double max_tension;                  // [N]
   double max_length;                   // of the backbone; the unit of lengths in tolerances [mm]
@@ -22,6 +48,7 @@ struct Robot {
   std::vector<Vec<2>> lines;           // where each line of points that can touch crosses the disks [mm]
   std::vector<double> edges;           // longest distance of neighbouring points of each line [mm]
   int between;                         // number of points of a line between two nodes
+  Rod rod = {};
 
   int positions() const { return segments * (between + 1) + 1; }  // of a line
   int points() const { return static_cast<int>(lines.size()) * positions(); }
@@ -35,11 +62,12 @@ struct DiskGap {
 
 template <int C>
 struct Command {
-  Vec<C> cables;  // displacements [mm]
-  double length;  // of the backbone [mm]
+  Vec<C> cables;     // displacements [mm]
+  double length;     // of the backbone [mm]
+  double loads = 1;  // part of a rod's loads that act
 
   friend bool operator==(const Command& a, const Command& b) {
-    return a.cables.v == b.cables.v && a.length == b.length;
+    return a.cables.v == b.cables.v && a.length == b.length && a.loads == b.loads;
   }
 };
 

@@ -6,10 +6,13 @@ namespace ccr {
 #ifdef CCR_AVX2
 namespace avx2 {
 void bend(int n, const double* sines, double displacement, double length, double offset, PaperLaw::Bends& bends);
-void bend(int n, const double* angles, double length, double offset, RodLaw::Bends& bends);
+void bend(int n, const double* angles, double length, RodLaw::Bends& bends);
 bool bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends);
 void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
                          const Rows& adjoints, Rows& hessians);
+void bend_arc(int n, double length, const Rows& controls, Rows& bends);
+void take_cable(int n, double length, const double* hole, const Rows& controls, const Rows& bends, Rows& cable);
+void arc_hessian_contraction(int n, double length, const Rows& controls, const Rows& adjoints, Rows& hessians);
 }  // namespace avx2
 
 namespace {
@@ -24,11 +27,11 @@ void PaperLaw::bend(int n, const double* sines, double displacement, double leng
   baseline::bend(n, sines, displacement, length, offset, bends);
 }
 
-void RodLaw::bend(int n, const double* angles, double, double length, double offset, Bends& bends) {
+void RodLaw::bend(int n, const double* angles, double, double length, double, Bends& bends) {
 #ifdef CCR_AVX2
-  if (has_avx2) return avx2::bend(n, angles, length, offset, bends);
+  if (has_avx2) return avx2::bend(n, angles, length, bends);
 #endif
-  baseline::bend(n, angles, length, offset, bends);
+  baseline::bend(n, angles, length, bends);
 }
 
 bool SpatialLaw::bend(int n, const SegmentInputs& inputs, const Rows& controls, Rows& bendings, Rows& bends) {
@@ -44,6 +47,29 @@ void SpatialLaw::hessian_contraction(int n, const SegmentInputs& inputs, const R
   if (has_avx2) return avx2::hessian_contraction(n, inputs, controls, bendings, adjoints, hessians);
 #endif
   baseline::hessian_contraction(n, inputs, controls, bendings, adjoints, hessians);
+}
+
+void SpatialArcLaw::bend(int n, double length, const Rows& controls, Rows& bends) {
+#ifdef CCR_AVX2
+  if (has_avx2) return avx2::bend_arc(n, length, controls, bends);
+#endif
+  baseline::bend_arc(n, length, controls, bends);
+}
+
+void SpatialArcLaw::take(int n, double length, const double* hole, const Rows& controls, const Rows& bends,
+                         Rows& cable) {
+#ifdef CCR_AVX2
+  if (has_avx2) return avx2::take_cable(n, length, hole, controls, bends, cable);
+#endif
+  baseline::take_cable(n, length, hole, controls, bends, cable);
+}
+
+void SpatialArcLaw::hessian_contraction(int n, double length, const Rows& controls, const Rows& adjoints,
+                                        Rows& hessians) {
+#ifdef CCR_AVX2
+  if (has_avx2) return avx2::arc_hessian_contraction(n, length, controls, adjoints, hessians);
+#endif
+  baseline::arc_hessian_contraction(n, length, controls, adjoints, hessians);
 }
 
 }  // namespace ccr

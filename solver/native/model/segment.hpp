@@ -1,6 +1,7 @@
 // Models of a segment and its cables: their generated laws, evaluated for all segments of a robot at once.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 namespace ccr {
@@ -32,13 +33,14 @@ class Rows {
 template <class Bend>
 class Table : public Rows {
  public:
-  static constexpr int kLaws = 10;
+  static constexpr int kLaws = sizeof(Bend) / sizeof(double) - 2;
 
   explicit Table(int segments) : Rows(kLaws + 2, segments) {}
 
   Bend operator[](int i) const {
-    return {at(0, i), at(1, i), at(2, i), at(3, i), at(4, i),  at(5, i),
-            at(6, i), at(7, i), at(8, i), at(9, i), at(10, i), at(11, i)};
+    return [&]<int... kNumber>(std::integer_sequence<int, kNumber...>) {
+      return Bend{at(kNumber, i)...};
+    }(std::make_integer_sequence<int, kLaws + 2>{});
   }
   void set_chord(int segment, double dx, double dy) {
     row(kLaws)[segment] = dx;
@@ -65,8 +67,8 @@ struct PaperLaw {
   static void bend(int n, const double* sines, double displacement, double length, double offset, Bends& bends);
 };
 
-// The discrete rod (Rao 2024): the cable slides through all disks. A segment is an arc, its coordinate the angle θ
-// between its disks. What the segments take from the cable together must not be less than the displacement.
+// The rod in the plane (Rao 2024): cables slide through all disks. A segment is an arc, its coordinate the angle θ
+// between its disks. What the segments take up from a cable together must not be less than its displacement.
 struct RodLaw {
   static constexpr bool kRod = true;
 
@@ -75,12 +77,22 @@ struct RodLaw {
     double forward, sideways;                    // chord along and across the lower disk's y axis, over its length
     double stretch, stretch_slope;               // c'/c and c''/c of the length c of the chord
     double cosine, sine;                         // of θ
-    double taken, taken_slope, taken_curvature;  // cable taken [mm]
+    double half_cosine, half_sine;               // of θ/2
+    double short_by, short_slope, short_curvature;  // by how much the chord is shorter than the segment [mm]
     double dx, dy;                               // chord in the base frame
     static constexpr double slope = 1, curvature = 0, heading_slope = -0.5, heading_curvature = 0;
   };
 
   using Bends = Table<Bend>;
+
+  // Cable at a distance towards +x that a segment takes up, with its derivatives in the angle.
+  struct Taken {
+    double value, slope, curvature;
+  };
+  static Taken taken(const Bend& bend, double distance) {
+    return {bend.short_by + 2 * distance * bend.half_sine, bend.short_slope + distance * bend.half_cosine,
+            bend.short_curvature - distance * bend.half_sine / 2};
+  }
 
   static void bend(int n, const double* angles, double displacement, double length, double offset, Bends& bends);
 };
@@ -103,6 +115,21 @@ struct SpatialLaw {
   // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_hessian_contraction`.
   static void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
                                   const Rows& adjoints, Rows& hessians);
+};
+
+// The rod in space: a segment is an arc, its controls a rotation vector (see solver/spatial/arc.py).
+struct SpatialArcLaw {
+  static constexpr int kControl = 3, kBend = 36, kCable = 13, kAdjoint = 6, kHessian = 9;
+  static constexpr int kChord = 30, kSpread = 33;  // numbers of a bend that a cable takes
+
+  // Evaluates the law `ccr_spatial_arc` of n segments.
+  static void bend(int n, double length, const Rows& controls, Rows& bends);
+
+  // Evaluates what n segments take up from a cable through a hole of the disks, by the law `ccr_spatial_cable`.
+  static void take(int n, double length, const double* hole, const Rows& controls, const Rows& bends, Rows& cable);
+
+  // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_spatial_arc_hessian`.
+  static void hessian_contraction(int n, double length, const Rows& controls, const Rows& adjoints, Rows& hessians);
 };
 
 }  // namespace ccr

@@ -12,7 +12,7 @@ using namespace tolerances;
 // Leaves in `trial_` the shape of the free robot; false where it touched an obstacle, or would overlap one.
 template <class Model>
 bool ModelContinuation<Model>::try_free_shape() {
-  if (problem_.touches_obstacle(trial_.active)) return false;
+  if (!problem_.bends_evenly() || problem_.touches_obstacle(trial_.active)) return false;
   problem_.set_free_shape(trial_);
   return problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
 }
@@ -71,7 +71,7 @@ template <class Model>
 double ModelContinuation<Model>::energy_loss(const Command& command) const {
   double work = 0;
   for (int k = 0; k < kCables; ++k) {
-    const double pulled = std::abs(command.cables[k]) - std::abs(present_.command.cables[k]);
+    const double pulled = pull(command, k) - pull(present_.command, k);
     work += (tensions_[k] + trial_tensions_[k]) / 2 * pulled;
   }
   return work / problem_.energy_scale() - (problem_.energy() - energy_);
@@ -82,13 +82,13 @@ double ModelContinuation<Model>::energy_loss(const Command& command) const {
 template <class Model>
 bool ModelContinuation<Model>::left_branch(const Command& command, double moved, double loss) {
   if (moved <= kStill * problem_.robot().max_length) return false;
-  // A free robot has but one branch, and one that is held tight has no room to jump.
-  if (!problem_.touches_obstacle(present_.active) || is_tight()) return false;
+  // A free robot that bends evenly has but one branch, and one that is held tight has no room to jump.
+  if ((problem_.bends_evenly() && !problem_.touches_obstacle(present_.active)) || is_tight()) return false;
   if (has_trend_ && follows_trend()) return false;
-  if (command.length == present_.command.length) {
+  if (command.length == present_.command.length && command.loads == present_.command.loads) {
     double unevenness = 0;  // work that a tension which does not change linearly may add or take
     for (int k = 0; k < kCables; ++k)
-      unevenness += std::abs(std::abs(command.cables[k]) - std::abs(present_.command.cables[k])) *
+      unevenness += std::abs(pull(command, k) - pull(present_.command, k)) *
                     (kUnevenChange * std::abs(trial_tensions_[k] - tensions_[k]) +
                      kUnevenTension * std::max(tensions_[k], trial_tensions_[k]));
     if (std::abs(loss) * problem_.energy_scale() <= unevenness) return false;

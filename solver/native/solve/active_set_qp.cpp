@@ -182,7 +182,7 @@ int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const Activ
     double motion = 0, turn = 0;
     for (int k = 0; k < Model::kSpace; ++k) motion += std::abs(d[k]);
     for (int k = 0; k < Model::kTurn; ++k) turn += std::abs(d[Model::kSpace + k]);
-    reach = std::max(reach, motion + problem.robot().offset * turn);
+    reach = std::max(reach, motion + problem.farthest_line() * turn);
   }
   double shift = 0;  // of any mount
   for (const auto& d : step.mounts) {

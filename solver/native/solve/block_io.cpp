@@ -12,8 +12,8 @@ namespace {
 
 // By loops, which for so few numbers are faster than the calls that copies become.
 template <std::size_t N>
-const double* read(const double* from, std::array<double, N>& numbers) {
-  for (double& number : numbers) number = *from++;
+const double* read(const double* from, std::array<double, N>& numbers, std::size_t count = N) {
+  for (std::size_t k = 0; k < count; ++k) numbers[k] = *from++;
   return from;
 }
 
@@ -33,9 +33,9 @@ void add_contact(ActiveSet& active, int contact, double multiplier) {
 
 template <class Model>
 void ModelContinuation<Model>::read_block(const double* block) {
-  read(block + layout_.cables.offset, present_.command.cables.v);
+  read(block + layout_.cables.offset, present_.command.cables.v, layout_.cables.size);
   present_.command.length = block[layout_.length.offset];
-  read(block + layout_.tensions.offset, tensions_.v);
+  read(block + layout_.tensions.offset, tensions_.v, layout_.cables.size);
   const double* coordinates = block + layout_.coordinates.offset;
   for (Control& control : present_.controls) coordinates = read(coordinates, control.v);
   const double* nodes = block + layout_.nodes.offset;
@@ -50,11 +50,13 @@ void ModelContinuation<Model>::read_block(const double* block) {
   energy_ = block[layout_.objective.offset] + problem_.spring_energy(present_.mounts, present_.command.length);
   problem_.update_broadphase(nodes_, present_.mounts);
   place_points<Model>(problem_.robot(), nodes_, frames_, points_);
-  read(block + layout_.onset.offset, onset_.v);
+  read(block + layout_.onset.offset, onset_.v, layout_.cables.size);
   read_active_set(block);
+  present_.command.loads = 1;
   present_evaluated_ = false;
+  if (problem_.has_loads()) evaluate_present();  // for the energy
   began_in_contact_ = problem_.touches_obstacle(present_.active);
-  if (!kTrend) return clear_trend();
+  if (!keeps_trend()) return clear_trend();
   const double* trend = block + layout_.trend_coordinates.offset;
   for (Control& control : trend_.controls) trend = read(trend, control.v);
   read_mounts(block + layout_.trend_displacements.offset, trend_.mounts);
@@ -68,9 +70,11 @@ void ModelContinuation<Model>::read_active_set(const double* block) {
   active.count = 0;
   const int points = static_cast<int>(points_.size());
   const double *flags = block + layout_.flags.offset, *multipliers = block + layout_.multipliers.offset;
-  if (Model::kRod && tensions_[0] > 0)  // first, as a robot that it holds need not be stable without it
-    add_contact(active, problem_.slack_contact(),
-                tensions_[0] / problem_.robot().energy_scale(present_.command.length));
+  if (Model::kRod)
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+      if (tensions_[k] > 0)  // first, as a robot that they hold need not be stable without them
+        add_contact(active, problem_.slack_contact(k),
+                    tensions_[k] / problem_.robot().energy_scale(present_.command.length));
   if (std::find(flags, flags + points, 1.0) != flags + points)
     for (int c = 0; c < problem_.contacts(); ++c)
       if (flags[c % points] != 0 && multipliers[c] > 0 && active.count < kMaxActive)
@@ -78,7 +82,8 @@ void ModelContinuation<Model>::read_active_set(const double* block) {
   if (!Model::kRod) return;
   const double* disks = block + layout_.disk_multipliers.offset;
   for (int i = 0; i < problem_.robot().segments; ++i)
-    if (disks[i] != 0) add_contact(active, problem_.first_disk_contact() + 2 * i + (disks[i] < 0), std::abs(disks[i]));
+    if (disks[i] != 0)
+      add_contact(active, problem_.first_disk_contact() + Model::kDiskSides * i + (disks[i] < 0), std::abs(disks[i]));
 }
 
 template <class Model>
@@ -90,9 +95,9 @@ void ModelContinuation<Model>::read_mounts(const double* displacements, std::vec
 
 template <class Model>
 void ModelContinuation<Model>::write_block(double* block) {
-  write(present_.command.cables.v, block + layout_.cables.offset);
+  write(present_.command.cables.v, block + layout_.cables.offset, layout_.cables.size);
   block[layout_.length.offset] = present_.command.length;
-  write(tensions_.v, block + layout_.tensions.offset);
+  write(tensions_.v, block + layout_.tensions.offset, layout_.cables.size);
   block[layout_.objective.offset] = problem_.objective();
   double* coordinates = block + layout_.coordinates.offset;
   for (const Control& control : present_.controls) coordinates = write(control.v, coordinates);
@@ -106,9 +111,9 @@ void ModelContinuation<Model>::write_block(double* block) {
   block[layout_.clearance.offset] = lowest(problem_.contacts(), [&](int c) { return gaps[c]; });
   write_mounts(present_.mounts, block + layout_.displacements.offset);
   write_forces(block);
-  write(onset_.v, block + layout_.onset.offset);
-  write(problem_.free_slopes(present_.command).v, block + layout_.tip_slopes.offset);
-  if (kTrend) write_trend(block);
+  write(onset_.v, block + layout_.onset.offset, layout_.cables.size);
+  write(problem_.free_slopes(present_.command).v, block + layout_.tip_slopes.offset, layout_.tip_slopes.size);
+  if (keeps_trend()) write_trend(block);
 }
 
 template <class Model>
@@ -140,7 +145,8 @@ void ModelContinuation<Model>::write_active_set(double* block) const {
   std::fill_n(disks, problem_.robot().segments, 0.0);
   for (int j = 0; j < active.count; ++j)
     if (const int disk = active.contact[j] - problem_.first_disk_contact(); disk >= 0)
-      disks[disk / 2] = disk % 2 == 0 ? active.multiplier[j] : -active.multiplier[j];
+      disks[disk / std::max(1, Model::kDiskSides)] =
+          disk % std::max(1, Model::kDiskSides) == 0 ? active.multiplier[j] : -active.multiplier[j];
 }
 
 template <class Model>

@@ -21,13 +21,20 @@ std::vector<int> each(int count, std::vector<int> shape) {
   return shape;
 }
 
+// Slopes of the free tip in each displacement; none where the model has no closed form of them.
+template <class Model>
+std::vector<int> tip_shape(int cables) {
+  if (cables == 1 || Model::kTip == 0) return {Model::kTip};
+  return Model::kRod ? std::vector{0} : std::vector{cables, Model::kTip / cables};
+}
+
 }  // namespace
 
 template <class Model>
 BlockLayout make_block_layout(const BlockCounts& counts) {
-  const int n = counts.segments, cables = Model::kCables, space = Model::kSpace, obstacles = counts.obstacles;
+  const int n = counts.segments, cables = counts.cables, space = Model::kSpace, obstacles = counts.obstacles;
   const std::vector<int> contacts = {obstacles, counts.lines, counts.positions};
-  const bool trend = Model::kCables == 1;
+  const bool trend = cables == 1;
   BlockLayout out;
   append(out, out.cables, {cables});
   append(out, out.length, {1});
@@ -43,7 +50,7 @@ BlockLayout make_block_layout(const BlockCounts& counts) {
   append(out, out.force, {space});
   append(out, out.clearance, {1});
   append(out, out.onset, {cables});
-  append(out, out.tip_slopes, cables == 1 ? std::vector{Model::kTip} : std::vector{cables, Model::kTip / cables});
+  append(out, out.tip_slopes, tip_shape<Model>(cables));
   append(out, out.flags, {counts.lines * counts.positions});
   append(out, out.disk_multipliers, {Model::kRod ? n : 0});
   append(out, out.trend_coordinates, each(trend ? n : 0, {Model::kControl}));
@@ -54,9 +61,10 @@ BlockLayout make_block_layout(const BlockCounts& counts) {
 
 BlockLayout make_block_layout(ModelKind model, const BlockCounts& counts) {
   switch (model) {
-    case ModelKind::kPaper: return make_block_layout<Planar<PaperLaw>>(counts);
-    case ModelKind::kRod: return make_block_layout<Planar<RodLaw>>(counts);
-    default: return make_block_layout<Spatial>(counts);
+    case ModelKind::kPlanarPaper: return make_block_layout<PlanarPaper>(counts);
+    case ModelKind::kPlanarRod: return make_block_layout<PlanarRod>(counts);
+    case ModelKind::kSpatialPaper: return make_block_layout<SpatialPaper>(counts);
+    default: return make_block_layout<SpatialRod>(counts);
   }
 }
 

@@ -18,12 +18,13 @@ struct BlockField {
 // What the sizes of the fields depend on beside the model.
 struct BlockCounts {
   int segments;
+  int cables;
   int lines, positions;  // of the points that can touch
   int obstacles;
 };
 
 struct BlockLayout {
-  BlockField cables{"cables"};                // displacements [mm]
+  BlockField cables{"cables"};                // displacements, in the paper's model of space signed [mm]
   BlockField length{"length"};                // of the backbone [mm]
   BlockField tensions{"tensions"};            // [N]
   BlockField objective{"objective"};          // of the robot alone, over the energy scale [rad²]
@@ -39,7 +40,7 @@ struct BlockLayout {
   BlockField onset{"onset"};  // tensions where the present contact began, signed as the displacements; else 0 [N]
   BlockField tip_slopes{"tip_slopes"};  // of the free tip in each displacement
   BlockField flags{"flags"};            // 1 for each point in the active set, else 0
-  // Rod model: multipliers of disks that meet, signed as the angle between them.
+  // Rod: multiplier of the disks of each segment that meet, in the plane signed as the angle between them.
   BlockField disk_multipliers{"disk_multipliers"};
   // One cable: change of the equilibrium per millimetre of displacement, from which the next step starts.
   BlockField trend_coordinates{"trend_coordinates"};

@@ -79,18 +79,18 @@ void ContactProblem<Model>::measure_gaps() {
 }
 
 template <class Model>
-void ContactProblem<Model>::measure_slack_and_disks(const Command& command) requires(Model::kRod) {
+void ContactProblem<Model>::measure_slacks_and_disks(const Command& command) requires(Model::kRod) {
   const auto add = [this](int contact, double gap) {
     gaps_[contact] = gap;
     near_.push_back(contact);
   };
-  add(slack_contact(), model_.slack(command));
+  for (int k = 0; k < model_.cables().count(); ++k)
+    add(slack_contact(k), model_.cables().slack(k, command.cables[k]));
   const double close = tolerances::kDisksClose * (model_.segment_length() - robot_.disk_thickness) / robot_.disk_radius;
   if (model_.widest <= close) return;
   for (int i = 0; i < robot_.segments; ++i) {
-    const double angle = states()[i][2] - states()[i + 1][2];
-    if (std::abs(angle) <= close) continue;
-    const int contact = first_disk_contact() + 2 * i + (angle < 0);
+    if (std::abs(model_.bend(i)) <= close) continue;
+    const int contact = first_disk_contact() + Model::kDiskSides * i + model_.disk_side(i);
     add(contact, disk_gap(contact).value);
   }
 }
@@ -115,6 +115,7 @@ void ContactProblem<Model>::all_gaps(double* gaps) const {
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 
-template void ContactProblem<Planar<RodLaw>>::measure_slack_and_disks(const Command&);
+template void ContactProblem<PlanarRod>::measure_slacks_and_disks(const Command&);
+template void ContactProblem<SpatialRod>::measure_slacks_and_disks(const Command&);
 
 }  // namespace ccr

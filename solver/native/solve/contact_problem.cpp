@@ -16,7 +16,7 @@ ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
       clear_(obstacles),
       nodes_(robot.segments + 1),
       points_(robot.points()),
-      gaps_(obstacles * points_.size() + Model::kRod * (1 + 2 * robot.segments),
+      gaps_(obstacles * points_.size() + Model::kRod * (robot.rod.cables.size() + Model::kDiskSides * robot.segments),
             std::numeric_limits<double>::infinity()),
       mount_of_(obstacles, -1),
       node_forces_(robot.segments + 1) {
@@ -25,9 +25,9 @@ ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
   for (const Vec<2>& line : robot.lines) {
     for (int k = 0; k < robot.positions(); ++k)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line});
-    reach_ = std::max(reach_, norm(line));
+    farthest_line_ = std::max(farthest_line_, norm(line));
   }
-  reach_ += tolerances::kReach * robot.max_length + (robot.between > 0 ? robot.max_length / robot.segments : 0);
+  reach_ = farthest_line_ + tolerances::kReach * robot.max_length + (robot.between > 0 ? robot.max_length / robot.segments : 0);
 }
 
 template <class Model>
@@ -46,14 +46,16 @@ void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
 template <class Model>
 bool ContactProblem<Model>::evaluate(const Iterate& at) {
   if (!model_.evaluate(at.command, at.controls)) return false;
+  loaded_ = at.command.loads;
   update_springs(at.mounts);
+  if constexpr (Model::kRod) energy_ -= load_work();
   barrier_energy_ = 0;
   if (barrier_enabled_) add_barrier(at.controls);
   for (int i = 0; i <= robot_.segments; ++i)
     for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
   place_points<Model>(robot_, nodes_, frames(), points_);
   measure_gaps();
-  if constexpr (Model::kRod) measure_slack_and_disks(at.command);
+  if constexpr (Model::kRod) measure_slacks_and_disks(at.command);
   return true;
 }
 
@@ -99,6 +101,57 @@ double ContactProblem<Model>::spring_energy(const std::vector<Position>& mounts,
   return energy / robot_.energy_scale(length);
 }
 
+// Calls `each` with node, lever, force and moment of every load: gravity as the weight of each segment, half and half
+// at its nodes, then the dead loads.
+template <class Model>
+template <class Each>
+void ContactProblem<Model>::each_load(Each each) const {
+  const Rod& rod = robot_.rod;
+  const double scale = loaded_ / energy_scale();
+  const auto scaled = [&](const Vec<3>& force, double by) {
+    Position out;
+    for (int k = 0; k < kSpace; ++k) out[k] = scale * by * force[k];
+    return out;
+  };
+  const int n = robot_.segments;
+  if (dot(rod.weight, rod.weight) > 0)
+    for (int i = 1; i <= n; ++i)
+      each(i, Position{}, scaled(rod.weight, model_.segment_length() * (i < n ? 1 : 0.5)), 0.0);
+  for (const Load& load : rod.loads)
+    each(load.node, Model::lever(frames()[load.node], load.at), scaled(load.force, 1), scale * load.moment);
+}
+
+template <class Model>
+double ContactProblem<Model>::load_work() {
+  double work = 0, pressed = 0;
+  each_load([&](int node, const Position& lever, const Position& force, double moment) {
+    for (int k = 0; k < kSpace; ++k) work += force[k] * (states()[node][k] + lever[k]);
+    if constexpr (Model::kTurn == 1) work += moment * states()[node][2];
+    pressed += norm(force) * robot_.max_length + std::abs(moment);
+  });
+  load_slope_ = pressed;
+  return work;
+}
+
+template <class Model>
+void ContactProblem<Model>::add_loads(std::vector<State>& node_forces) const {
+  each_load([&](int node, const Position& lever, const Position& force, double moment) {
+    const auto turning = ccr::moment(lever, force);
+    for (int k = 0; k < kSpace; ++k) node_forces[node][k] += force[k];
+    for (int k = 0; k < Model::kTurn; ++k) node_forces[node][kSpace + k] += turning[k];
+    if constexpr (Model::kTurn == 1) node_forces[node][2] += moment;
+  });
+}
+
+template <class Model>
+void ContactProblem<Model>::add_load_curvature(System& system) const {
+  each_load([&](int node, const Position& lever, const Position& force, double) {
+    const auto turn = hessian_contraction(lever, force);
+    for (int r = 0; r < Model::kTurn; ++r)
+      for (int c = 0; c < Model::kTurn; ++c) system.node_hessian[node](kSpace + r, kSpace + c) -= turn(r, c);
+  });
+}
+
 template <class Model>
 void ContactProblem<Model>::set_free_shape(Iterate& at) {
   at.active.count = 0;
@@ -107,7 +160,7 @@ void ContactProblem<Model>::set_free_shape(Iterate& at) {
   if constexpr (Model::kRod)
     if (at.command.cables[0] > 0) {
       control = model_.free_control(at.command);
-      at.active.contact[0] = slack_contact();
+      at.active.contact[0] = slack_contact(0);
       at.active.multiplier[0] = model_.free_slack_multiplier();
       at.active.count = 1;
     }
@@ -129,10 +182,16 @@ Gap<ContactProblem<Model>::kSpace> ContactProblem<Model>::gap(int contact) const
 template <class Model>
 ContactProblem<Model>::Slope ContactProblem<Model>::slope(int contact) const {
   if constexpr (Model::kRod) {
-    if (contact == slack_contact()) return {{}, -1, {}, model_.minus_slack_slopes().data()};
-    if (contact > slack_contact()) {  // a function of the angle between two nodes
-      const double slope = disk_gap(contact).slope;
-      return {{(contact - first_disk_contact()) / 2, true, {{0, 0, slope}}, {{0, 0, -slope}}}, -1, {}};
+    if (is_slack(contact)) return {{}, -1, {}, model_.cables().minus_slopes(contact - contacts()).data()};
+    if (contact >= first_disk_contact()) {  // a function of the rotation between two nodes
+      const int segment = disk_segment(contact);
+      const auto moment = model_.disk_moment(segment, disk_gap(contact));
+      State lower{}, upper{};
+      for (int k = 0; k < Model::kTurn; ++k) {
+        lower[kSpace + k] = -moment[k];
+        upper[kSpace + k] = moment[k];
+      }
+      return {{segment, true, lower, upper}, -1, {}};
     }
   }
   const Position normal = gap(contact).slope;
@@ -156,8 +215,8 @@ ContactProblem<Model>::Force ContactProblem<Model>::force(int contact, const Pos
 
 template <class Model>
 double ContactProblem<Model>::lever_arm(int contact) const {
-  if (contact == slack_contact()) return robot_.offset * robot_.segments;
-  if (contact > slack_contact()) return robot_.disk_radius;
+  if (is_slack(contact)) return robot_.offset * robot_.segments;
+  if (contact >= first_disk_contact()) return robot_.disk_radius;
   const Site& site = this->site(contact);
   return model_.segment_length() * (site.node + (site.fraction > 0));
 }
@@ -177,8 +236,9 @@ double ContactProblem<Model>::violation() const {
 
 template <class Model>
 double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) const {
-  const double scale = Model::kRod ? model_.max_objective_slope : model_.free_turn() * model_.free_turn();
-  double pressed = model_.max_objective_slope;  // largest slope, of the objective or of a contact
+  const double scale =
+      Model::kRod ? model_.max_objective_slope + load_slope_ : model_.free_turn() * model_.free_turn();
+  double pressed = Model::kRod ? scale : model_.max_objective_slope;  // largest slope, of the objective or of a contact
   for (int j = 0; j < active.count; ++j)
     pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));
   return tolerances::kStationarity * scale + tolerances::kRoundoff * pressed;
@@ -187,13 +247,15 @@ double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) co
 template <class Model>
 void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
   std::fill(node_forces_.begin(), node_forces_.end(), State{});
-  double slack_multiplier = 0;
+  Vec<Model::kCables> slack_multipliers{};
+  if constexpr (Model::kRod) add_loads(node_forces_);
   for (std::size_t m = 0; m < springs_.size(); ++m) mount_gradient_[m] = times(springs_[m], displacements_[m]);
   for (int j = 0; j < active.count; ++j) {
-    if (active.contact[j] == slack_contact()) {
-      slack_multiplier = active.multiplier[j];
-      continue;
-    }
+    if constexpr (Model::kRod)
+      if (is_slack(active.contact[j])) {
+        slack_multipliers[active.contact[j] - contacts()] = active.multiplier[j];
+        continue;
+      }
     const auto& [force, mount, normal, minus_controls] = slope(active.contact[j]);
     if (mount >= 0)
       for (int k = 0; k < kSpace; ++k) mount_gradient_[mount][k] += active.multiplier[j] * normal[k];
@@ -203,8 +265,7 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
     }
   }
   model_.propagate_adjoints(node_forces_);
-  if constexpr (Model::kRod)
-    if (slack_multiplier != 0) model_.add_slack(slack_multiplier);
+  if constexpr (Model::kRod) model_.add_slacks(slack_multipliers);
   if (in_barrier())
     for (std::size_t i = 0; i < barrier_slope_.size(); ++i) model_.gradient[i] += barrier_slope_[i];
 }
@@ -212,13 +273,19 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
 template <class Model>
 void ContactProblem<Model>::lagrangian_hessian(const ActiveSet& active, System& system) const {
   model_.lagrangian_hessian(system);
+  if constexpr (Model::kRod) add_load_curvature(system);
   if (in_barrier())
     for (std::size_t i = 0; i < barrier_curvature_.size(); ++i) system.stages[i].huu += barrier_curvature_[i];
   for (int j = 0; j < active.count; ++j) {
     const int contact = active.contact[j];
     if constexpr (Model::kRod)
-      if (contact > slack_contact()) add_disk_curvature(contact, -active.multiplier[j], system);
-    if (contact >= contacts()) continue;  // the model has the curvature of the slack
+      if (contact >= first_disk_contact()) {
+        const int segment = disk_segment(contact);
+        auto curvature = model_.disk_curvature(segment, disk_gap(contact));
+        for (double& entry : curvature.v) entry *= active.multiplier[j];
+        system.stages[segment].huu -= curvature;
+      }
+    if (contact >= contacts()) continue;  // the model has the curvature of the slacks
     const Gap<kSpace> gap = this->gap(contact);
     const Site& site = this->site(contact);
     const double scale = -active.multiplier[j];
@@ -254,22 +321,11 @@ void ContactProblem<Model>::lagrangian_hessian(const ActiveSet& active, System& 
 }
 
 template <class Model>
-void ContactProblem<Model>::add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod) {
-  const int node = (contact - first_disk_contact()) / 2;
-  const double curvature = scale * disk_gap(contact).curvature;
-  Mat<kState, kState> cross;
-  cross(2, 2) = -curvature;
-  system.node_hessian[node](2, 2) += curvature;
-  system.node_hessian[node + 1](2, 2) += curvature;
-  system.couple(node, cross);
-}
-
-template <class Model>
 ContactProblem<Model>::Tensions ContactProblem<Model>::tensions(const ActiveSet& active) const {
   Tensions tensions = model_.displacement_slopes();
   if constexpr (Model::kRod)
     for (int j = 0; j < active.count; ++j)
-      if (active.contact[j] == slack_contact()) tensions[0] = active.multiplier[j];
+      if (is_slack(active.contact[j])) tensions[active.contact[j] - contacts()] = active.multiplier[j];
   for (double& tension : tensions.v) tension *= energy_scale();
   return tensions;
 }

@@ -14,8 +14,8 @@
 namespace ccr {
 
 // Contacts in the active set and their multipliers λ >= 0. The index of a contact with an obstacle is
-// (obstacle * lines + line) * positions + position. For the rod, the slack of the cable follows, then two contacts of
-// the disks of each segment: on the side of the cable, and opposite.
+// (obstacle * lines + line) * positions + position. For the rod, the slacks of the cables follow, then the contacts of
+// the disks of each segment, on each side where they can meet.
 struct ActiveSet {
   int count = 0;
   std::array<int, tolerances::kMaxActive> contact;
@@ -115,12 +115,12 @@ class ContactProblem {
 
   const Robot& robot() const { return robot_; }
   std::span<const Obstacle> obstacles() const { return obstacles_; }
-  // Number of contacts with obstacles; the slack of the rod's cable is the next index, then its disks.
+  // Number of contacts with obstacles; the slacks of a rod's cables are the next indices, then its disks.
   int contacts() const { return static_cast<int>(mount_of_.size() * points_.size()); }
   bool touches_obstacle(const ActiveSet& active) const;  // whether any is with an obstacle
 
   double objective() const { return model_.objective; }
-  double energy() const { return energy_; }  // J: objective and springs, over the energy scale [rad²]
+  double energy() const { return energy_; }  // J: objective, springs and loads, over the energy scale [rad²]
   double spring_energy(const std::vector<Position>& mounts, double length) const;  // over the energy scale [rad²]
   double violation() const;                                                        // max(0, -c) over all gaps [mm]
   double stationarity_tolerance(const ActiveSet& active) const;  // of the gradient of the Lagrangian [rad²]
@@ -131,6 +131,7 @@ class ContactProblem {
   // Contacts within reach, and the gap of every contact, infinite out of reach [mm].
   const std::vector<int>& near_contacts() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
+  double farthest_line() const { return farthest_line_; }    // distance of a line of points from the backbone [mm]
   bool out_of_reach(int obstacle, double motion) const;      // of all points, even after such a motion
   void all_gaps(double* gaps) const;                         // of every contact, within reach or not
   Gap<kSpace> gap(int contact) const;                        // with derivatives in the point
@@ -141,8 +142,11 @@ class ContactProblem {
   int mount_of(int obstacle) const { return mount_of_[obstacle]; }
   const Mat<kSpace, kSpace>& spring(int mount) const { return springs_[mount]; }  // stiffness over the energy scale
   const std::vector<Position>& mount_gradient() const { return mount_gradient_; }
-  int slack_contact() const { return contacts(); }
-  int first_disk_contact() const { return contacts() + 1; }
+  int slack_contact(int cable) const { return contacts() + cable; }
+  bool is_slack(int contact) const { return contact >= contacts() && contact < first_disk_contact(); }
+  int first_disk_contact() const { return contacts() + (Model::kRod ? static_cast<int>(robot_.rod.cables.size()) : 0); }
+  bool has_loads() const { return dot(robot_.rod.weight, robot_.rod.weight) > 0 || !robot_.rod.loads.empty(); }
+  bool bends_evenly() const { return model_.bends_evenly(); }  // where nothing touches
   double lever_arm(int contact) const;  // approximate derivative of the gap in a control [mm]
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
@@ -161,20 +165,29 @@ class ContactProblem {
   Position displacement(int obstacle) const {
     return mount_of_[obstacle] < 0 ? Position{} : displacements_[mount_of_[obstacle]];
   }
-  void add_disk_curvature(int contact, double scale, System& system) const requires(Model::kRod);
+  // Loads of a rod: their work, their forces on the nodes, and the Hessian of that work, all over the energy scale.
+  template <class Each>
+  void each_load(Each each) const;
+  double load_work();
+  void add_loads(std::vector<State>& node_forces) const;
+  void add_load_curvature(System& system) const;
   void add_barrier(const std::vector<Control>& controls);
   void update_springs(const std::vector<Position>& mounts);
   void measure_gaps();
-  void measure_slack_and_disks(const Command& command) requires(Model::kRod);
+  void measure_slacks_and_disks(const Command& command) requires(Model::kRod);
+  int disk_segment(int contact) const { return (contact - first_disk_contact()) / Model::kDiskSides; }
   DiskGap disk_gap(int contact) const requires(Model::kRod) {
-    return model_.disk_gap((contact - first_disk_contact()) / 2, (contact - first_disk_contact()) % 2 == 0 ? 1 : -1);
+    return model_.disk_gap(disk_segment(contact), (contact - first_disk_contact()) % Model::kDiskSides);
   }
 
   Robot robot_;
   Model model_;
   std::span<const Obstacle> obstacles_;
+  double farthest_line_ = 0;  // distance of a line of points from the backbone
   double reach_ = 0;  // distance of a node from an obstacle within which its points are measured
   double energy_ = 0;
+  double loaded_ = 1;      // part of the loads that act
+  double load_slope_ = 0;  // bound on the slope of their work in a control
   bool barrier_enabled_ = false;
   double barrier_energy_ = 0;
   std::vector<Control> barrier_slope_;  // of each segment

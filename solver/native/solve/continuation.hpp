@@ -39,6 +39,10 @@ class Continuation {
 
   virtual void set_interruption(Interruption interruption) = 0;
 
+  // Writes the equilibrium of the robot at a length with no cable displaced: from its shape without loads, these are
+  // raised evenly.
+  virtual StepResult rest(double length, double* to) = 0;
+
   // Takes the robot from the equilibrium in one block towards the command `target`, cables and length evenly, and
   // writes the equilibrium reached to another block, which may be the same. Writes nothing where it is interrupted.
   virtual StepResult follow(const double* from, const double* target, double* to) = 0;

@@ -16,6 +16,10 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   const bool motor_holds = !only_releases(command);
   const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
+  if (!problem_.bends_evenly() && !problem_.touches_obstacle(present_.active)) {
+    before_contact_ = present_;
+    at_contact_ = command;
+  }
   descent_points_ = points_;
   descent_mounts_ = mounts_;
   descent_trace_ = shapes_ ? shapes_->size() : 0;

@@ -59,7 +59,7 @@ void KktSystem<Model>::assemble(const ContactProblem& problem, const ActiveSet& 
     for (int k = 0; k < Model::kShears; ++k) max_curvature_ = std::max(max_curvature_, std::abs(stage.huu(k, k)));
   for (int j = 0; j < active.count; ++j) {
     penalty_[j] = 0;
-    if (strength == 0 || active.contact[j] == problem.slack_contact()) continue;
+    if (strength == 0 || problem.is_slack(active.contact[j])) continue;
     const Force slope = problem.slope(active.contact[j]).force;
     const double arm = problem.lever_arm(active.contact[j]);
     penalty_[j] = strength * max_curvature_ / (arm * arm);

@@ -24,6 +24,7 @@ struct ModelContinuation<Model>::Pursuit {
 template <class Model>
 ModelContinuation<Model>::ModelContinuation(const Robot& robot, int obstacles)
     : layout_(make_block_layout<Model>({.segments = robot.segments,
+                                        .cables = Model::kRod ? static_cast<int>(robot.rod.cables.size()) : kCables,
                                         .lines = static_cast<int>(robot.lines.size()),
                                         .positions = robot.positions(),
                                         .obstacles = obstacles})),
@@ -49,25 +50,33 @@ double ModelContinuation<Model>::command_distance(const Command& a, const Comman
   const Robot& robot = problem_.robot();
   double farthest = 0;
   for (int k = 0; k < kCables; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
-  return std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
+  farthest = std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
+  return std::max(farthest, kLoading * std::abs(a.loads - b.loads));
 }
 
 // The travel that the trend is a slope in: signed for one cable; several cables move evenly while their trend lasts.
 template <class Model>
 double ModelContinuation<Model>::travel(const Command& from, const Command& to) const {
-  return kCables == 1 ? to.cables[0] - from.cables[0] : command_distance(from, to);
+  return keeps_trend() ? to.cables[0] - from.cables[0] : command_distance(from, to);
+}
+
+// How far a cable is pulled in. A displacement in the paper's model of space pulls one cable of a pair.
+template <class Model>
+double ModelContinuation<Model>::pull(const Command& command, int cable) const {
+  return Model::kRod ? command.cables[cable] : std::abs(command.cables[cable]);
 }
 
 template <class Model>
 bool ModelContinuation<Model>::pulls_cable(const Command& command) const {
   for (int k = 0; k < kCables; ++k)
-    if (std::abs(command.cables[k]) > std::abs(present_.command.cables[k])) return true;
+    if (pull(command, k) > pull(present_.command, k)) return true;
   return false;
 }
 
 template <class Model>
 bool ModelContinuation<Model>::only_releases(const Command& command) const {
-  return !pulls_cable(command) && command.length == present_.command.length && !(command == present_.command);
+  return !pulls_cable(command) && command.length == present_.command.length &&
+         command.loads == present_.command.loads && !(command == present_.command);
 }
 
 template <class Model>
@@ -90,6 +99,7 @@ void ModelContinuation<Model>::accept() {
   update_trend();
   const double limit = problem_.robot().max_tension;
   if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) keep_last_held(present_);
+  keep_before_contact(trial_);
   std::swap(present_, trial_);
   tensions_ = trial_tensions_;
   energy_ = problem_.energy();
@@ -103,7 +113,8 @@ void ModelContinuation<Model>::update_trend() {
   const ActiveSet &before = present_.active, &now = trial_.active;
   const double travelled = travel(present_.command, trial_.command);
   clear_trend();
-  if (travelled == 0 || trial_.command.length != present_.command.length || !problem_.touches_obstacle(now) ||
+  const bool known = problem_.bends_evenly() && !problem_.touches_obstacle(now);
+  if (travelled == 0 || trial_.command.length != present_.command.length || known ||
       before.count != now.count ||
       !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
     return;
@@ -197,7 +208,7 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
 template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
   double& step = pursuit.step;
-  bool stalled = kCables == 1 && is_at_tension_limit() && pulls_cable(goal) && goal.length == present_.command.length;
+  bool stalled = layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) && goal.length == present_.command.length;
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
   const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
   const Move move = stalled ? Move::kOverTension : try_command(next);
@@ -230,27 +241,71 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   return true;
 }
 
-// Tensions of the free robot where it first touches, found by bisection between the start of the step and `present_`,
-// each with the sign of its displacement.
+// Before the robot first touches: keeps its last shape, from which the onset of the contact is found.
 template <class Model>
-ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command& start) {
-  const auto clear = [&](double part) {
+void ModelContinuation<Model>::keep_before_contact(const Iterate& next) {
+  if (problem_.bends_evenly() || problem_.touches_obstacle(present_.active)) return;
+  if (!problem_.touches_obstacle(next.active)) return;
+  before_contact_ = present_;
+  at_contact_ = next.command;
+}
+
+// Leaves in `trial_` the robot under a command part of the way to where it touches; false where it touches.
+template <class Model>
+bool ModelContinuation<Model>::is_clear_at(const Command& start, double part) {
+  if (problem_.bends_evenly()) {
     trial_.command = between(start, present_.command, part);
     problem_.set_free_shape(trial_);
     return problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
-  };
+  }
+  trial_ = before_contact_;
+  trial_.command = between(before_contact_.command, at_contact_, part);
+  if (newton_.solve(trial_, 0).converged && !problem_.touches_obstacle(trial_.active)) return true;
+  trial_ = before_contact_;
+  problem_.evaluate(trial_);
+  return false;
+}
+
+// Tensions of the free robot where it first touches, found by bisection, each with the sign of its displacement.
+template <class Model>
+ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command& start) {
+  const auto clear = [&](double part) { return is_clear_at(start, part); };
   double low = 0, high = 1;
   if (!clear(high))
     for (int i = 0; i < kOnsetBisections; ++i) {
       const double middle = (low + high) / 2;
       (clear(middle) ? low : high) = middle;
     }
-  clear(high);
+  clear(problem_.bends_evenly() ? high : low);
   problem_.reduced_gradient(trial_.active);
   Tensions tensions = problem_.tensions(trial_.active);
-  for (int k = 0; k < kCables; ++k)
-    if (trial_.command.cables[k] < 0) tensions[k] = -tensions[k];
+  if (!Model::kRod)
+    for (int k = 0; k < kCables; ++k)
+      if (trial_.command.cables[k] < 0) tensions[k] = -tensions[k];
   return tensions;
+}
+
+template <class Model>
+StepResult ModelContinuation<Model>::rest(double length, double* to) {
+  const Robot& robot = problem_.robot();
+  result_ = {};
+  factorizations_before_ = newton_.factorizations();
+  was_exceeded_ = began_in_contact_ = present_evaluated_ = false;
+  present_.command = {{}, length, problem_.has_loads() ? 0.0 : 1.0};
+  present_.active.count = 0;
+  for (int i = 0; i < robot.segments; ++i)
+    for (int k = 0; k < Model::kControl; ++k)
+      present_.controls[i][k] = Model::kRod ? robot.rod.rest[i * Model::kControl + k] : 0.0;
+  std::fill(present_.mounts.begin(), present_.mounts.end(), Position{});
+  clear_trend();
+  evaluate_present();
+  for (std::size_t i = 0; i < nodes_.size(); ++i) std::copy_n(problem_.states()[i].v.begin(), kSpace, nodes_[i].v.begin());
+  problem_.update_broadphase(nodes_, present_.mounts);
+  problem_.evaluate(present_);
+  points_ = problem_.points();
+  mounts_ = present_.mounts;
+  result_.status = problem_.violation() > 0 ? Status::kGaveUp : pursue({{}, length});
+  return finish(present_.command, to);
 }
 
 template <class Model>
@@ -260,14 +315,25 @@ StepResult ModelContinuation<Model>::follow(const double* from, const double* ta
   was_exceeded_ = false;
   read_block(from);
   const Command start = present_.command;
-  Command wanted;
-  std::copy_n(target, kCables, wanted.cables.v.begin());
-  wanted.length = target[kCables];
+  const std::size_t cables = layout_.cables.size;
+  Command wanted{};
+  std::copy_n(target, cables, wanted.cables.v.begin());
+  wanted.length = target[cables];
   if (shapes_) {
     evaluate_present();
     record_shape();
   }
   result_.status = pursue(wanted);
+  finish(start, to);
+  if (result_.status == Status::kGaveUp && !std::isfinite(problem_.objective()) && to != from)
+    std::copy_n(from, layout_.size, to);
+  return result_;
+}
+
+// Writes the equilibrium that a step from a command has reached; nothing where it was interrupted, or no robot can have
+// its coordinates.
+template <class Model>
+StepResult ModelContinuation<Model>::finish(const Command& start, double* to) {
   if (result_.interrupted) return result_;
   if (was_exceeded_ && highest(tensions_) > problem_.robot().max_tension) {  // the step ended amid a yield
     present_ = last_held_;
@@ -283,12 +349,10 @@ StepResult ModelContinuation<Model>::follow(const double* from, const double* ta
   }
   evaluate_present();
   result_.factorizations = static_cast<int>(newton_.factorizations() - factorizations_before_);
-  if (std::isfinite(problem_.objective())) {
+  if (std::isfinite(problem_.objective()))
     write_block(to);
-  } else {  // no robot can have the coordinates in the block
-    if (to != from) std::copy_n(from, layout_.size, to);
+  else
     result_.status = Status::kGaveUp;
-  }
   return result_;
 }
 
@@ -329,6 +393,8 @@ Optimality ModelContinuation<Model>::optimality(const double* block) {
   template void ModelContinuation<Model>::record_shape();                                      \
   template void ModelContinuation<Model>::clear_trend();                                       \
   template void ModelContinuation<Model>::extrapolate_trial();                                 \
+  template StepResult ModelContinuation<Model>::rest(double, double*);                         \
+  template double ModelContinuation<Model>::pull(const Command&, int) const;                   \
   template bool ModelContinuation<Model>::pulls_cable(const Command&) const;                   \
   template bool ModelContinuation<Model>::only_releases(const Command&) const;                 \
   template double ModelContinuation<Model>::command_distance(const Command&, const Command&) const;
@@ -337,13 +403,14 @@ CCR_EACH_MODEL(CCR_INSTANTIATE)
 
 template <>
 std::unique_ptr<Continuation<2>> make_continuation(const Robot& robot, int obstacles) {
-  if (robot.model == ModelKind::kRod) return std::make_unique<ModelContinuation<Planar<RodLaw>>>(robot, obstacles);
-  return std::make_unique<ModelContinuation<Planar<PaperLaw>>>(robot, obstacles);
+  if (robot.model == ModelKind::kPlanarRod) return std::make_unique<ModelContinuation<PlanarRod>>(robot, obstacles);
+  return std::make_unique<ModelContinuation<PlanarPaper>>(robot, obstacles);
 }
 
 template <>
 std::unique_ptr<Continuation<3>> make_continuation(const Robot& robot, int obstacles) {
-  return std::make_unique<ModelContinuation<Spatial>>(robot, obstacles);
+  if (robot.model == ModelKind::kSpatialRod) return std::make_unique<ModelContinuation<SpatialRod>>(robot, obstacles);
+  return std::make_unique<ModelContinuation<SpatialPaper>>(robot, obstacles);
 }
 
 }  // namespace ccr

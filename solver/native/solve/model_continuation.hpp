@@ -28,7 +28,6 @@ template <class Model>
 class ModelContinuation : public Continuation<Model::kSpace> {
  public:
   static constexpr int kSpace = Model::kSpace, kCables = Model::kCables;
-  static constexpr bool kTrend = kCables == 1;  // whether the block keeps the trend for the next step
   using ContactProblem = ccr::ContactProblem<Model>;
   using Position = ccr::Position<kSpace>;
   using Command = ccr::Command<kCables>;
@@ -44,6 +43,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   const BlockLayout& layout() const override { return layout_; }
   void set_obstacles(std::span<const Obstacle<kSpace>> obstacles) override;
   void set_interruption(Interruption interruption) override { interruption_ = std::move(interruption); }
+  StepResult rest(double length, double* to) override;
   StepResult follow(const double* from, const double* target, double* to) override;
   StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) override;
   bool ramp_reaches_force(const Ramp& ramp, double* reached) override;
@@ -77,7 +77,12 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   void clear_trend();
   void extrapolate_trial();
   void evaluate_present();
+  void keep_before_contact(const Iterate& next);
+  bool is_clear_at(const Command& start, double part);
   Tensions first_tensions(const Command& start);
+  bool keeps_trend() const { return layout_.trend_coordinates.size > 0; }  // in the block, for the next step
+  StepResult finish(const Command& start, double* to);
+  double pull(const Command& command, int cable) const;
   double command_distance(const Command& a, const Command& b) const;
   double travel(const Command& from, const Command& to) const;
   bool pulls_cable(const Command& command) const;
@@ -146,6 +151,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   std::int64_t factorizations_before_ = 0;  // of the step
   Tensions onset_{};                        // tensions where the present contact began
   bool began_in_contact_ = false;           // whether an obstacle was touched where the step began
+  Iterate before_contact_;     // the last equilibrium of the step that touched nothing,
+  Command at_contact_{};       // and a command under which the robot touches
   Iterate last_held_;          // the last equilibrium of the step that the motors held, where a later one was not
   bool was_exceeded_ = false;  // whether there is one
 
@@ -173,6 +180,7 @@ Command<C> between(const Command<C>& a, const Command<C>& b, double t) {
   Command<C> out;
   for (int k = 0; k < C; ++k) out.cables[k] = a.cables[k] + t * (b.cables[k] - a.cables[k]);
   out.length = a.length + t * (b.length - a.length);
+  out.loads = a.loads + t * (b.loads - a.loads);
   return out;
 }
 

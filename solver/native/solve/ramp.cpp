@@ -10,16 +10,12 @@ template <class Model>
 bool ModelContinuation<Model>::ramp_reaches_force(const Ramp& ramp, double* reached) {
   std::fill_n(reached, kSpace, 0.0);
   if (!(ramp.increment > 0)) return false;
-  std::vector<double> rest(layout_.size);
-  rest[layout_.length.offset] = ramp.length;
-  Vec<kCables + 1> straight{};
-  straight[kCables] = ramp.length;
-  follow(rest.data(), straight.v.data(), rest.data());
-  if (problem_.violation() > 0) return false;
-  read_block(rest.data());
+  std::vector<double> start(layout_.size);
+  if (rest(ramp.length, start.data()).status != Status::kConverged || problem_.violation() > 0) return false;
+  read_block(start.data());
   Command command{{}, ramp.length};
   for (int i = 1; i * ramp.increment < ramp.limit; ++i) {
-    for (int k = 0; k < kCables; ++k) command.cables[k] = i * ramp.increment * ramp.direction[k];
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) command.cables[k] = i * ramp.increment * ramp.direction[k];
     factorizations_before_ = newton_.factorizations();
     if (pursue(command) != Status::kConverged) return false;
     evaluate_present();

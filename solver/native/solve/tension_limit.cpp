@@ -63,13 +63,12 @@ bool ModelContinuation<Model>::approach_tension_limit() {
 // cable.
 template <class Model>
 bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
-  if (kCables == 1) return false;
+  if (layout_.cables.size == 1) return false;
   const auto give_up = [&](double tension) {
     bool held = false;
     for (int k = 0; k < kCables; ++k) {
-      const double present = present_.command.cables[k];
-      if (tensions_[k] < tension || std::abs(wanted.cables[k]) <= std::abs(present)) continue;
-      wanted.cables[k] = present;
+      if (tensions_[k] < tension || pull(wanted, k) <= pull(present_.command, k)) continue;
+      wanted.cables[k] = present_.command.cables[k];
       held = true;
     }
     return held;
@@ -84,11 +83,11 @@ bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const
   const Robot& robot = problem_.robot();
   bool changed = false;
   for (int k = 0; k < kCables; ++k) {
-    const double present = present_.command.cables[k];
-    const double held = std::max(std::abs(present) - least * robot.offset, 0.0);
-    if (tensions_[k] <= robot.max_tension || present == 0 || wanted.cables[k] / present <= held / std::abs(present))
-      continue;
-    wanted.cables[k] = std::copysign(held, present);
+    const double present = present_.command.cables[k], lowest = Model::kRod ? robot.rod.least_pull : 0.0;
+    const double held = std::max(pull(present_.command, k) - least * robot.offset, lowest);
+    if (tensions_[k] <= robot.max_tension || held == pull(present_.command, k)) continue;
+    if (Model::kRod ? wanted.cables[k] <= held : wanted.cables[k] / present <= held / std::abs(present)) continue;
+    wanted.cables[k] = Model::kRod ? held : std::copysign(held, present);
     changed = true;
   }
   return changed;
@@ -98,7 +97,9 @@ bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const
 template <class Model>
 bool ModelContinuation<Model>::is_unyielding() const {
   for (int k = 0; k < kCables; ++k)
-    if (tensions_[k] > problem_.robot().max_tension && present_.command.cables[k] == 0) return true;
+    if (tensions_[k] > problem_.robot().max_tension &&
+        pull(present_.command, k) <= (Model::kRod ? problem_.robot().rod.least_pull : 0.0))
+      return true;
   return false;
 }
 

@@ -6,43 +6,13 @@
 #include "math/riccati.hpp"
 #include "model/robot.hpp"
 #include "model/segment.hpp"
+#include "model/spatial_chain.hpp"
 
 namespace ccr {
 
-// Derivative of the upper state of a segment in its lower one: the identity, and the motion of the end of the chord
-// per rotation of the lower disk.
-struct SpatialTransition {
-  Vec<3> chord;  // in the base frame
-};
-
-template <int N>
-Vec<N> times(const SpatialTransition& a, Vec<N> s) {
-  const Vec<3> motion = cross({{s[3], s[4], s[5]}}, a.chord);
-  for (int k = 0; k < 3; ++k) s[k] += motion[k];
-  return s;
-}
-
-template <int R, int N>
-Mat<R, N> times(Mat<R, N> m, const SpatialTransition& a) {
-  for (int r = 0; r < R; ++r) {
-    const Vec<3> moment = cross(a.chord, {{m(r, 0), m(r, 1), m(r, 2)}});
-    for (int k = 0; k < 3; ++k) m(r, 3 + k) += moment[k];
-  }
-  return m;
-}
-
-template <int N, int C>
-Mat<N, C> transpose_times(const SpatialTransition& a, Mat<N, C> m) {
-  for (int c = 0; c < C; ++c) {
-    const Vec<3> moment = cross(a.chord, {{m(0, c), m(1, c), m(2, c)}});
-    for (int k = 0; k < 3; ++k) m(3 + k, c) += moment[k];
-  }
-  return m;
-}
-
 // Two pairs of cables: a negative displacement pulls the cable on the opposite side. The controls of a segment are two
 // shears and the twist; the cables determine its bending.
-class Spatial {
+class SpatialPaper {
  public:
   static constexpr int kSpace = 3, kTurn = 3, kControl = 3, kCables = 2;
   static constexpr int kState = 6;  // position, and small rotation about the axes of the base frame
@@ -51,21 +21,20 @@ class Spatial {
   static constexpr int kTip =
       10;  // slopes of the free tip in each displacement: position, and rotation towards both cables
 
+  static constexpr int kDiskSides = 0;  // the disks of a segment shear before they meet
+
+  using Command = ccr::Command<kCables>;
   using Control = Vec<kControl>;
   using State = Vec<kState>;
   using Frame = Mat<3, 3>;  // its columns are the axes of the disk
   using System = Riccati<kState, kControl, SpatialTransition>;
 
-  explicit Spatial(const Robot& robot);
+  explicit SpatialPaper(const Robot& robot);
 
-  static Position<3> lever(const Frame& frame, const Vec<2>& line) {
-    Position<3> lever;
-    for (int k = 0; k < 3; ++k) lever[k] = frame(k, 0) * line[0] + frame(k, 1) * line[1];
-    return lever;
-  }
+  static Position<3> lever(const Frame& frame, const Vec<2>& line) { return disk_lever(frame, line); }
 
   // Evaluates the shape under a command; false where the cables cannot have their lengths.
-  bool evaluate(const Command<2>& command, const std::vector<Control>& controls);
+  bool evaluate(const Command& command, const std::vector<Control>& controls);
 
   // Computes the adjoints and the gradient of the Lagrangian J - Σ λ c in the controls; `node_forces` is Σ λ ∇c at
   // each node.
@@ -74,7 +43,8 @@ class Spatial {
   void lagrangian_hessian(System& system) const;
   Vec<2> displacement_slopes() const;  // of the Lagrangian in the size of each displacement; follows propagate_adjoints
 
-  Vec<kTip> free_slopes(const Command<2>& command) const;
+  bool bends_evenly() const { return true; }  // the robot that nothing touches, in all segments alike
+  Vec<kTip> free_slopes(const Command& command) const;
 
   // Sine of the shear angle at which a segment folds over.
   double widest_shear() const { return 1; }
@@ -101,14 +71,14 @@ class Spatial {
 
   static_assert(sizeof(Bend) == SpatialLaw::kBend * sizeof(double));
 
-  void set_inputs(const Command<2>& command);
+  void set_inputs(const Command& command);
 
   Robot robot_;
   SegmentInputs inputs_{};
   Rows controls_, bendings_, laws_, adjoints_;
   mutable Rows hessians_;
   std::vector<Bend> bends_;
-  std::vector<Vec<3>> forces_, moments_;  // adjoints of the upper state of each segment, in its lower disk's frame
+  std::vector<Wrench> wrenches_;  // adjoints of the upper state of each segment, in its lower disk's frame
 };
 
 }  // namespace ccr

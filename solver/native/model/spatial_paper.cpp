@@ -1,11 +1,11 @@
-#include "model/spatial.hpp"
+#include "model/spatial_paper.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 namespace ccr {
 
-Spatial::Spatial(const Robot& robot)
+SpatialPaper::SpatialPaper(const Robot& robot)
     : states(robot.segments + 1),
       frames(robot.segments + 1),
       gradient(robot.segments),
@@ -16,10 +16,9 @@ Spatial::Spatial(const Robot& robot)
       adjoints_(SpatialLaw::kAdjoint, robot.segments),
       hessians_(SpatialLaw::kHessian, robot.segments),
       bends_(robot.segments),
-      forces_(robot.segments),
-      moments_(robot.segments) {}
+      wrenches_(robot.segments) {}
 
-void Spatial::set_inputs(const Command<2>& command) {
+void SpatialPaper::set_inputs(const Command& command) {
   const double a = robot_.offset;
   const double holes[2][2] = {{a, 0}, {a * std::cos(robot_.angle), a * std::sin(robot_.angle)}};
   for (int k = 0; k < 2; ++k) {
@@ -30,21 +29,18 @@ void Spatial::set_inputs(const Command<2>& command) {
   inputs_.length = command.length / robot_.segments;
 }
 
-bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& controls) {
+bool SpatialPaper::evaluate(const Command& command, const std::vector<Control>& controls) {
   set_inputs(command);
   const int n = robot_.segments;
   for (int i = 0; i < n; ++i) controls_.put(i, controls[i].v.data(), kControl);
   if (!SpatialLaw::bend(n, inputs_, controls_, bendings_, laws_)) return false;
   objective = max_objective_slope = 0;
   states[0] = {};
-  frames[0] = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  frames[0] = kBaseFrame;
   for (int i = 0; i < n; ++i) {
     Bend& bend = bends_[i];
     laws_.get(i, bend.chord.v.data(), SpatialLaw::kBend);
-    const Vec<3> chord = times(frames[i], bend.chord);
-    states[i + 1] = states[i];
-    for (int k = 0; k < 3; ++k) states[i + 1][k] += chord[k];
-    frames[i + 1] = times(frames[i], bend.rotation);
+    move_up(bend, states[i], frames[i], states[i + 1], frames[i + 1]);
     objective += bend.objective;
     for (const double slope : bend.objective_slope.v)
       max_objective_slope = std::max(max_objective_slope, std::abs(slope));
@@ -52,72 +48,50 @@ bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& co
   return std::isfinite(objective);
 }
 
-void Spatial::propagate_adjoints(const std::vector<State>& node_forces) {
-  Vec<3> force, moment;
+void SpatialPaper::propagate_adjoints(const std::vector<State>& node_forces) {
+  Wrench wrench;
   for (int i = robot_.segments - 1; i >= 0; --i) {
     const Bend& bend = bends_[i];
-    for (int k = 0; k < 3; ++k) {
-      force[k] -= node_forces[i + 1][k];
-      moment[k] -= node_forces[i + 1][3 + k];
-    }
-    forces_[i] = transpose_times(frames[i], force);
-    moments_[i] = transpose_times(frames[i], moment);
-    adjoints_.put(i, forces_[i].v.data(), 3);
-    adjoints_.put(i, moments_[i].v.data(), 3, 3);
+    wrench.subtract(node_forces[i + 1]);
+    const Wrench& local = wrenches_[i] = wrench.in(frames[i]);
+    adjoints_.put(i, local.force.v.data(), 3);
+    adjoints_.put(i, local.moment.v.data(), 3, 3);
     gradient[i] = bend.objective_slope;
-    gradient[i] += transpose_times(bend.chord_slope, forces_[i]);
-    gradient[i] += transpose_times(bend.turn_slope, moments_[i]);
-    moment += cross(times(frames[i], bend.chord), force);
+    gradient[i] += transpose_times(bend.chord_slope, local.force);
+    gradient[i] += transpose_times(bend.turn_slope, local.moment);
+    wrench.moment += cross(times(frames[i], bend.chord), wrench.force);
   }
 }
 
-void Spatial::lagrangian_hessian(System& system) const {
+void SpatialPaper::lagrangian_hessian(System& system) const {
   SpatialLaw::hessian_contraction(robot_.segments, inputs_, controls_, bendings_, adjoints_, hessians_);
   for (int i = 0; i < robot_.segments; ++i) {
-    const Bend& bend = bends_[i];
-    const Frame& frame = frames[i];
     System::Stage& stage = system.stages[i];
-    stage.a.chord = times(frame, bend.chord);
-    const Mat<3, 3> chord_slope = times(frame, bend.chord_slope), turn_slope = times(frame, bend.turn_slope);
-    const Vec<3> force = times(frame, forces_[i]), moment = times(frame, moments_[i]);
-    const Mat<3, 3> turned = hessian_contraction(stage.a.chord, force);
-    system.node_hessian[i] = {};
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) {
-        stage.b(r, c) = chord_slope(r, c);
-        stage.b(3 + r, c) = turn_slope(r, c);
-        system.node_hessian[i](3 + r, 3 + c) = turned(r, c);
-      }
-    stage.hux = {};
-    for (int k = 0; k < 3; ++k) {
-      const Vec<3> swung = cross({{chord_slope(0, k), chord_slope(1, k), chord_slope(2, k)}}, force);
-      const Vec<3> twisted = cross({{turn_slope(0, k), turn_slope(1, k), turn_slope(2, k)}}, moment);
-      for (int c = 0; c < 3; ++c) stage.hux(k, 3 + c) = swung[c] + twisted[c] / 2;
-    }
+    assemble_stage(bends_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
     hessians_.get(i, stage.huu.v.data(), SpatialLaw::kHessian);
   }
   system.node_hessian[robot_.segments] = {};
 }
 
-Vec<2> Spatial::displacement_slopes() const {
+Vec<2> SpatialPaper::displacement_slopes() const {
   Vec<2> slopes;
   for (int i = 0; i < robot_.segments; ++i) {
     const Bend& bend = bends_[i];
     slopes += bend.objective_displacement_slope;
-    slopes += transpose_times(bend.chord_displacement_slope, forces_[i]);
-    slopes += transpose_times(bend.turn_displacement_slope, moments_[i]);
+    slopes += transpose_times(bend.chord_displacement_slope, wrenches_[i].force);
+    slopes += transpose_times(bend.turn_displacement_slope, wrenches_[i].moment);
   }
   for (double& slope : slopes.v) slope /= robot_.segments;
   return slopes;
 }
 
-double Spatial::free_turn() const {
+double SpatialPaper::free_turn() const {
   return (std::abs(inputs_.displacements[0]) + std::abs(inputs_.displacements[1])) / robot_.offset;
 }
 
 // All segments bend by the same angle θ towards t, where h·t is the displacement of each hole h and |t| = 2 sin θ/2:
 // the chord of segment i is at the angle (i + 1/2) θ in the plane of t.
-Vec<10> Spatial::free_slopes(const Command<2>& command) const {
+Vec<10> SpatialPaper::free_slopes(const Command& command) const {
   const int n = robot_.segments;
   const double a = robot_.offset, length = command.length / n, cosine = std::cos(robot_.angle),
                sine = std::sin(robot_.angle);

@@ -1,0 +1,97 @@
+// Kinematics of a chain of segments in space, shared by the models: from one disk to the next, forces back, and the
+// blocks of the Hessian. `Bend` holds the outputs of a segment law, in the frame of the lower disk: chord, rotation,
+// chord_slope and turn_slope.
+#pragma once
+
+#include "math/linalg.hpp"
+#include "math/rotations.hpp"
+
+namespace ccr {
+
+// Derivative of the upper state of a segment in its lower one: the identity, and the motion of the end of the chord
+// per rotation of the lower disk.
+struct SpatialTransition {
+  Vec<3> chord;  // in the base frame
+};
+
+template <int N>
+Vec<N> times(const SpatialTransition& a, Vec<N> s) {
+  const Vec<3> motion = cross({{s[3], s[4], s[5]}}, a.chord);
+  for (int k = 0; k < 3; ++k) s[k] += motion[k];
+  return s;
+}
+
+template <int R, int N>
+Mat<R, N> times(Mat<R, N> m, const SpatialTransition& a) {
+  for (int r = 0; r < R; ++r) {
+    const Vec<3> moment = cross(a.chord, {{m(r, 0), m(r, 1), m(r, 2)}});
+    for (int k = 0; k < 3; ++k) m(r, 3 + k) += moment[k];
+  }
+  return m;
+}
+
+template <int N, int C>
+Mat<N, C> transpose_times(const SpatialTransition& a, Mat<N, C> m) {
+  for (int c = 0; c < C; ++c) {
+    const Vec<3> moment = cross(a.chord, {{m(0, c), m(1, c), m(2, c)}});
+    for (int k = 0; k < 3; ++k) m(3 + k, c) += moment[k];
+  }
+  return m;
+}
+
+inline constexpr Mat<3, 3> kBaseFrame = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+
+// Point on a disk, from its center, at a place in its frame.
+inline Vec<3> disk_lever(const Mat<3, 3>& frame, const Vec<2>& place) {
+  Vec<3> lever;
+  for (int k = 0; k < 3; ++k) lever[k] = frame(k, 0) * place[0] + frame(k, 1) * place[1];
+  return lever;
+}
+
+// State and frame of the upper disk of a segment.
+template <class Bend>
+void move_up(const Bend& bend, const Vec<6>& state, const Mat<3, 3>& frame, Vec<6>& next, Mat<3, 3>& next_frame) {
+  const Vec<3> chord = times(frame, bend.chord);
+  next = state;
+  for (int k = 0; k < 3; ++k) next[k] += chord[k];
+  next_frame = times(frame, bend.rotation);
+}
+
+// Adjoint of a state, in the base frame.
+struct Wrench {
+  Vec<3> force, moment;
+
+  void subtract(const Vec<6>& node_force) {
+    for (int k = 0; k < 3; ++k) {
+      force[k] -= node_force[k];
+      moment[k] -= node_force[3 + k];
+    }
+  }
+  Wrench in(const Mat<3, 3>& frame) const { return {transpose_times(frame, force), transpose_times(frame, moment)}; }
+};
+
+// Blocks of the Hessian of a segment in its lower state, and between that and the controls, from the adjoint of its
+// upper state in the lower disk's frame.
+template <class Bend, class Stage>
+void assemble_stage(const Bend& bend, const Mat<3, 3>& frame, const Wrench& local, Stage& stage,
+                    Mat<6, 6>& node_hessian) {
+  stage.a.chord = times(frame, bend.chord);
+  const Mat<3, 3> chord_slope = times(frame, bend.chord_slope), turn_slope = times(frame, bend.turn_slope);
+  const Vec<3> force = times(frame, local.force), moment = times(frame, local.moment);
+  const Mat<3, 3> turned = hessian_contraction(stage.a.chord, force);
+  node_hessian = {};
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) {
+      stage.b(r, c) = chord_slope(r, c);
+      stage.b(3 + r, c) = turn_slope(r, c);
+      node_hessian(3 + r, 3 + c) = turned(r, c);
+    }
+  stage.hux = {};
+  for (int k = 0; k < 3; ++k) {
+    const Vec<3> swung = cross({{chord_slope(0, k), chord_slope(1, k), chord_slope(2, k)}}, force);
+    const Vec<3> twisted = cross({{turn_slope(0, k), turn_slope(1, k), turn_slope(2, k)}}, moment);
+    for (int c = 0; c < 3; ++c) stage.hux(k, 3 + c) = swung[c] + twisted[c] / 2;
+  }
+}
+
+}  // namespace ccr
