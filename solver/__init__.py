@@ -2,6 +2,7 @@
 
 from solver.cache.memo import TransitionMemo
 from solver.common.equilibrium import Optimality, Residuals
+from solver.common.rod import Cable, Load
 from solver.common.obstacle import Extent, Obstacle
 from solver.common.scene import Scene
 from solver.common.status import Status
@@ -20,6 +21,7 @@ from solver.planar.solve import Solver
 
 __all__ = [
     "BatchSolver",
+    "Cable",
     "Capsule",
     "Circle",
     "Custom",
@@ -28,6 +30,7 @@ __all__ = [
     "Extent",
     "Family",
     "HalfPlane",
+    "Load",
     "Obstacle",
     "Optimality",
     "Polygon",

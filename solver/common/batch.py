@@ -11,7 +11,7 @@ from solver.common.checks import check_clear, check_core, check_memory, check_sc
 from solver.common.equilibrium import BaseEquilibrium, RobotT_co
 from solver.common.exclusive import ExclusiveUse
 from solver.common.geometry import touching_gaps
-from solver.common.layout import Layout, Model
+from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
 from solver.common.scene import MAX_OBSTACLES, Scene
 from solver.common.status import Status
@@ -59,11 +59,11 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         TypeError: If the robot is not one of the batch's space.
     """
 
-    model: ClassVar[Model]
+    space: ClassVar[int]
     robot_kind: ClassVar[type]
 
     def __init__(self, robot: RobotT_co, count: int, obstacles: int, threads: int = 1) -> None:
-        check_scene(robot, self.robot_kind, Scene(), self.model)
+        check_scene(robot, self.robot_kind, Scene(), self.space)
         self.robot, self.count = robot, check_whole("count", count, 1, 2**31 - 1)
         obstacles = check_whole("obstacles", obstacles, 0, MAX_OBSTACLES)
         threads = check_whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "more do not help")
@@ -74,17 +74,17 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         self.iterations = np.zeros(self.count, np.int64)
         self.factorizations = np.zeros(self.count, np.int64)
         self._scenes: list[Scene | None] = [None] * self.count
-        self.commands = np.zeros((self.count, self.model.cables + 1))
+        self.cables = len(robot.cables)
+        self.commands = np.zeros((self.count, self.cables + 1))
         self._kernel_batch = self._make_kernel(obstacles, threads)
         self._all = list(range(self.count))
         self._exclusive = ExclusiveUse()
         self._clear: Scene | None = None  # last scene found to leave the straight robot clear
         self._straight: np.ndarray | None = None  # points of the straight robot, computed on first use
         self._unrested = set(self._all)  # must be brought to rest before they move
-        most = robot.cable_limit_mm
-        least = 0.0 if self.model.cables == 1 else -most
-        self._low = np.array(self.model.cables * [least] + [robot.shortest_mm])
-        self._high = np.array(self.model.cables * [most] + [robot.longest_mm])
+        least, most = robot.least_cable_mm, robot.cable_limit_mm
+        self._low = np.array(self.cables * [least] + [robot.shortest_mm])
+        self._high = np.array(self.cables * [most] + [robot.longest_mm])
         self._bound = f"from {least:.6g} to {most:.6g} (robot.max_cable_mm)"
 
     @abstractmethod
@@ -121,7 +121,7 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
         if scene == self._scenes[index]:
             return
-        check_scene(self.robot, self.robot_kind, scene, self.model)
+        check_scene(self.robot, self.robot_kind, scene, self.space)
         if len(scene) != self.layout.obstacles:
             raise ValueError(f"scene has {len(scene)} obstacles; each of the batch's has {self.layout.obstacles}")
         check_core(self.robot, scene)
@@ -146,7 +146,7 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         return clear
 
     def rest(self, robots: Sequence[int]) -> None:
-        """Make some robots straight and unactuated again.
+        """Bring some robots to rest again, as ``rest()`` of their solver.
 
         Raises:
             ValueError: If an index is out of range or repeated, or a robot has no scene; nothing has changed then.
@@ -154,18 +154,16 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         indices = self._check_assigned(robots)
         with self._exclusive:
             self._unrested.update(indices)
-            self.blocks[indices] = 0.0
-            self.blocks[indices, self.layout.length.at] = self.robot.length_mm
-            self.commands[indices] = 0.0
+            self._rest(indices)
+            self.commands[indices, :-1] = self.layout.cables(self.blocks[indices])
             self.commands[indices, -1] = self.robot.length_mm
-            self._move(indices)
             self._unrested.difference_update(indices)
 
     def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
         """Move the cables of all robots, or of some, as far as tension and obstacles allow.
 
         Args:
-            cable_mm: Commanded cable displacement of each of them, ``(k,)``, in space ``(k, 2)`` [mm].
+            cable_mm: Commanded cable displacement of each of them, ``(k,)``, of several cables ``(k, c)`` [mm].
             robots: Indices of the robots; ``None`` for all.
 
         Raises:
@@ -173,7 +171,7 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
                 repeated, or a robot was not brought to rest in its scene; nothing has moved then.
         """
         indices = self._all if robots is None else self._check_indices(robots)
-        cables = self.model.cables
+        cables = self.cables
         shape = (len(indices),) if cables == 1 else (len(indices), cables)
         commands = check_array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
         with self._exclusive:
@@ -263,11 +261,11 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         forces = check_array("forces", forces, (count,), 0.0, LARGEST, "finite and not negative")
         limit = check_positive("limit_mm", limit_mm, high=most)
         increment = check_positive("increment_mm", increment_mm, limit / MAX_PULL_STEPS, LARGEST)
-        given = np.ones((count, self.model.cables)) if directions is None else directions
-        least = 0.0 if self.model.cables == 1 else -1.0
-        given = check_array("directions", given, (count, self.model.cables), least, 1.0, f"from {least:g} to 1")
+        given = np.ones((count, self.cables)) if directions is None else directions
+        least = 0.0 if self.robot.least_cable_mm == 0 else -1.0
+        given = check_array("directions", given, (count, self.cables), least, 1.0, f"from {least:g} to 1")
         target = -1 if obstacle is None else check_whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
-        reached = np.zeros((count, self.model.space))
+        reached = np.zeros((count, self.space))
         length = self.robot.length_mm
         with self._exclusive:
             found = self._kernel_batch.ramps_reach_forces(
@@ -342,6 +340,10 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         if self._straight is None:
             self._straight = np.ascontiguousarray(self._straight_points())
         return touching_gaps(self.robot, scene, self._straight)
+
+    def _rest(self, robots: list[int]) -> None:
+        work = self.statuses, self.iterations, self.factorizations
+        self._kernel_batch.rest(robots, self.robot.length_mm, self.blocks, *work)
 
     def _move(self, robots: list[int]) -> None:
         self._kernel_batch.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)

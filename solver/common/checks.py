@@ -6,7 +6,6 @@ import os
 import numpy as np
 
 from solver.common.equilibrium import BaseEquilibrium
-from solver.common.layout import Model
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
 from solver.common.validation import check_instance, shown
@@ -43,7 +42,7 @@ def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
             raise ValueError(f"{shown(obstacle)} overlaps the straight robot by {-own.min():.3g} mm at node {node}")
 
 
-def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None:
+def check_scene(robot: AnyRobot, kind: type, scene: Scene, space: int) -> None:
     """Check that robot and scene are of the solver's space, and in proportion to each other.
 
     Raises:
@@ -54,8 +53,8 @@ def check_scene(robot: AnyRobot, kind: type, scene: Scene, model: Model) -> None
     check_instance("robot", robot, kind, remedy)
     check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
     for obstacle in scene:
-        if obstacle.space != model.space:
-            names = ("the plane", "solver.spatial") if model.space == 3 else ("space", "solver")
+        if obstacle.space != space:
+            names = ("the plane", "solver.spatial") if space == 3 else ("space", "solver")
             raise ValueError(f"{shown(obstacle)} is an obstacle of {names[0]}; take one from the package {names[1]}")
         obstacle.check_proportion(robot.longest_mm)
         if obstacle.spring is not None:

@@ -14,17 +14,14 @@ class Model(NamedTuple):
     Attributes:
         kind: What the kernel computes of a segment.
         space: Dimensions of a point.
-        cables: Cables, in space pairs of them.
     """
 
     kind: _kernel.Model
     space: int
-    cables: int
 
 
-PLANE = Model(_kernel.Model.PAPER, space=2, cables=1)
-ROD = PLANE._replace(kind=_kernel.Model.ROD)
-SPACE = Model(_kernel.Model.SPATIAL, space=3, cables=2)
+PLANE = {"paper": Model(_kernel.Model.PLANAR_PAPER, space=2), "rod": Model(_kernel.Model.PLANAR_ROD, space=2)}
+SPACE = {"paper": Model(_kernel.Model.SPATIAL_PAPER, space=3), "rod": Model(_kernel.Model.SPATIAL_ROD, space=3)}
 
 
 class Field:
@@ -53,6 +50,7 @@ class Layout:
     Args:
         model: The model of the robot.
         segments: Segments of the robot.
+        cables: Its cables, in the paper's model of space pairs of them.
         lines: Lines of points that can touch.
         positions: Points of a line.
         obstacles: Obstacles of the scene.
@@ -82,15 +80,15 @@ class Layout:
     trend_displacements: Field
     trend_multipliers: Field
 
-    def __init__(self, model: Model, segments: int, lines: int, positions: int, obstacles: int) -> None:
+    def __init__(self, model: Model, segments: int, cables: int, lines: int, positions: int, obstacles: int) -> None:
         self.obstacles = obstacles
         self.size = 0
-        for field in _kernel.block_layout(model.kind, segments, lines, positions, obstacles):
+        for field in _kernel.block_layout(model.kind, segments, cables, lines, positions, obstacles):
             setattr(self, field.name, Field(field))
             self.size = field.offset + field.size
 
 
 @lru_cache(maxsize=128)
-def make_layout(model: Model, segments: int, lines: int, positions: int, obstacles: int) -> Layout:
+def make_layout(model: Model, segments: int, cables: int, lines: int, positions: int, obstacles: int) -> Layout:
     """Return the layout for robots and scenes of these sizes."""
-    return Layout(model, segments, lines, positions, obstacles)
+    return Layout(model, segments, cables, lines, positions, obstacles)

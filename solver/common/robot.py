@@ -10,6 +10,9 @@ RIGIDITIES = (1e-60, 1e60)  # that leave EI/L² and EI/2l0, and the squares of f
 OFFSETS = (1e-4, 10.0)  # over the longest length: nearer cables leave too few digits of their share
 LEAST_TENSION = 1e-6  # a limit of tension, over EI/(aL): the robot cannot bend below it
 LEAST_CABLE = 1e-6  # the largest cable displacement, over a
+MODELS = ("paper", "rod")
+THICKEST = 0.9  # thickness of a disk, over the segment at its shortest
+ANGLES = 64  # samples in the search for the longest edge of a bent segment
 MAX_POINTS = 2**18  # that can touch, on all lines together
 
 
@@ -33,6 +36,14 @@ class AnyRobot(Protocol):
         """Number of segments."""
 
     @property
+    def disk_radius_mm(self) -> float | None:
+        """Radius of the disks of a rod [mm]."""
+
+    @property
+    def disk_thickness_mm(self) -> float:
+        """Thickness of the disks of a rod [mm]."""
+
+    @property
     def offset_mm(self) -> float:
         """Distance a of the cables from the backbone [mm]."""
 
@@ -47,6 +58,18 @@ class AnyRobot(Protocol):
     @property
     def max_cable_mm(self) -> float | None:
         """Largest cable displacement as given [mm]."""
+
+    @property
+    def model(self) -> str:
+        """``"paper"`` or ``"rod"``."""
+
+    @property
+    def cables(self) -> Sized:
+        """The cables, in the paper's model of space pairs of them."""
+
+    @property
+    def least_cable_mm(self) -> float:
+        """Least displacement of a cable [mm]."""
 
     @property
     def cable_limit_mm(self) -> float:
@@ -133,3 +156,47 @@ def check_cable_limit(robot: AnyRobot, default: float) -> None:
     least = LEAST_CABLE * robot.offset_mm
     check_number("max_cable_mm", largest, least, math.inf, f"at least {least:.6g}, {LEAST_CABLE} of offset_mm")
     object.__setattr__(robot, "max_cable_mm", largest)
+
+
+def check_model(model: object) -> None:
+    """Check the name of a model.
+
+    Raises:
+        ValueError: Naming the value and the names.
+    """
+    if not (isinstance(model, str) and model in MODELS):
+        raise refusal("model", model, f"one of {', '.join(MODELS)}")
+
+
+def check_disks(robot: AnyRobot) -> None:
+    """Fill in the radius of the disks, and check it and their thickness in proportion to the robot.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    radius = robot.offset_mm if robot.disk_radius_mm is None else robot.disk_radius_mm
+    low, high = (ratio * robot.longest_mm for ratio in OFFSETS)
+    bound = f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length"
+    radius = check_number("disk_radius_mm", radius, low, high, bound)
+    most = THICKEST * robot.shortest_mm / robot.segments
+    bound = f"from 0 to {most:.6g}, {THICKEST} of a segment's length"
+    thickness = check_number("disk_thickness_mm", robot.disk_thickness_mm, 0.0, most, bound)
+    object.__setattr__(robot, "disk_radius_mm", radius)
+    object.__setattr__(robot, "disk_thickness_mm", thickness)
+
+
+def widest_bend(segment: float, disk_radius: float, disk_thickness: float) -> float:
+    """Return the angle by which a segment of the rod can bend before its disks meet, at most half a turn [rad]."""
+    return min((segment - disk_thickness) / disk_radius, math.pi)
+
+
+def longest_arc_edge(segment: float, line: float, widest: float) -> float:
+    """Return the longest distance of neighbouring nodes of a line beside an arc, on its outer side [mm].
+
+    Args:
+        segment: Length of the arc [mm].
+        line: Distance of the line from the backbone [mm].
+        widest: Largest angle of the arc [rad].
+    """
+    angles = (widest * k / ANGLES for k in range(1, ANGLES + 1))
+    return max(2 * (segment / t + abs(line)) * math.sin(t / 2) for t in angles)

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver import _kernel
 from solver.common.batch import RobotBatch
-from solver.common.layout import PLANE, Layout
+from solver.common.layout import Layout
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.planar.equilibrium import Equilibrium, touching_points
@@ -22,7 +22,7 @@ class BatchSolver(RobotBatch[Robot, Equilibrium]):
     See :class:`~solver.common.batch.RobotBatch`.
     """
 
-    model = PLANE
+    space = 2
     robot_kind = Robot
 
     def _straight_points(self) -> np.ndarray:
@@ -48,6 +48,11 @@ class ReferenceBatch(BatchSolver):
 
     The trial pulls of :meth:`ramp_reaches_force` still use the kernel.
     """
+
+    def _rest(self, robots: list[int]) -> None:
+        self.commands[robots] = 0.0
+        self.blocks[robots] = 0.0
+        self._move(robots)
 
     def _move(self, robots: list[int]) -> None:
         for robot in robots:

@@ -26,6 +26,16 @@ class Equilibrium(BaseEquilibrium[Robot]):
     robot_kind: ClassVar[type] = Robot
 
     @property
+    def cables_mm(self) -> np.ndarray:
+        """Displacement of each cable, as commanded unless stalled or blocked, ``(c,)`` [mm]."""
+        return self._layout.cables(self.block)
+
+    @property
+    def tensions(self) -> np.ndarray:
+        """Tension of each cable, ``(c,)`` [N]."""
+        return self._layout.tensions(self.block)
+
+    @property
     def cable_mm(self) -> float:
         """Cable displacement l, which differs from the command where the step stalled or was blocked [mm]."""
         return float(self.block[self._layout.cables.at])

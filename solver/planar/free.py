@@ -8,7 +8,6 @@ import numpy as np
 
 from solver.common.checks import check_scene
 from solver.common.geometry import touching_gaps
-from solver.common.layout import PLANE
 from solver.common.scene import Scene
 from solver.common.validation import check_instance, check_number, check_whole
 from solver.planar.equilibrium import touching_points
@@ -112,7 +111,7 @@ def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
         ValueError: If the displacement is out of the robot's range, or the scene is out of proportion to it.
         TypeError: If the robot or the scene is of the wrong class.
     """
-    check_scene(robot, Robot, scene, PLANE)
+    check_scene(robot, Robot, scene, 2)
     points = touching_points(robot, free_nodes(robot, cable_mm))
     return float(touching_gaps(robot, scene, points).min(initial=np.inf))
 

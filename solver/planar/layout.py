@@ -1,14 +1,10 @@
 """The memory layout of equilibria in the plane."""
 
-from solver.common.layout import PLANE, ROD, Layout, Model, make_layout
+from solver.common.layout import PLANE, Layout, make_layout
 from solver.planar.robot import Robot
-
-
-def layout_model(robot: Robot) -> Model:
-    """Return how many numbers describe a robot."""
-    return ROD if robot.model == "rod" else PLANE
 
 
 def layout(robot: Robot, obstacles: int) -> Layout:
     """Return the layout for a robot among a number of obstacles."""
-    return make_layout(layout_model(robot), robot.segments, len(robot.touch), robot.positions, obstacles)
+    sizes = robot.segments, len(robot.cables), len(robot.lines_mm), robot.positions
+    return make_layout(PLANE[robot.model], *sizes, obstacles)

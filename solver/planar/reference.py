@@ -24,7 +24,6 @@ from solver.common.ipopt import (
     SMALLEST_STEP,
     nlp_solver,
 )
-from solver.common.layout import PLANE
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.planar.equilibrium import Equilibrium, touching_points
@@ -73,7 +72,7 @@ class ReferenceSolver(CommandCheck):
     _plugin, _options = "ipopt", OPTIONS
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
-        check_scene(robot, Robot, scene, PLANE)
+        check_scene(robot, Robot, scene, 2)
         self.robot = robot
         self.scene = scene
         self._touchable = touchable_points(robot, scene)

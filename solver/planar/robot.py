@@ -5,14 +5,21 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
 
-from solver.common.robot import OFFSETS, check_cable_limit, check_fields, check_point_count, check_proportions
+from solver.common.robot import (
+    check_cable_limit,
+    check_disks,
+    check_fields,
+    check_model,
+    check_point_count,
+    check_proportions,
+    longest_arc_edge,
+    widest_bend,
+)
+from solver.common.rod import Cable, Load, check_rod, checked_precurvature, least_cable_mm
 from solver.common.validation import check_number, check_positive, check_sequence, refusal
 
 LINES = ("backbone", "cable", "rim")
-MODELS = ("paper", "rod")
-ANGLES = 64  # samples in the search for the longest edge of a bent segment
 LEAST_LENGTH = 1e-3  # shortest over longest length
-THICKEST = 0.9  # thickness of a disk, over the segment at its shortest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,9 +38,16 @@ class Robot:
             shear. ``"rod"``: the cable slides through the disks without friction and can go slack, and segments are
             arcs (Rao 2024); with more segments this robot converges to the elastica under constant tendon tension.
         length_range_mm: Shortest and longest length the base can insert [mm]; ``None`` for a robot of fixed length.
-        touch: Lines whose points can touch obstacles: ``"backbone"``, ``"cable"`` (both in the paper), and ``"rim"``,
-            the edge of the disks opposite to the cable.
+        touch: Lines whose points can touch obstacles: ``"backbone"``, ``"cable"``, those of all cables (both in the
+            paper), and ``"rim"``, the edge of the disks on the side of −x.
         between: Number of further points of each line, evenly spaced between every two nodes, that can touch.
+        cables: Cables of the rod, each a :class:`solver.Cable` at the angle 0 (towards +x) or π; the paper's model has
+            one at 0.
+        segment_rigidity: EI of each segment of the rod [N·mm²]; ``None`` for ``rigidity`` in all.
+        precurvature: Angle of each segment of the rod at rest, one number for all or each its own, positive towards +x
+            [rad].
+        weight_per_length: Weight of a unit of length of the rod [N/mm], half of a segment's at each of its nodes.
+        loads: Dead loads on disks of the rod, each a :class:`solver.Load`.
         disk_radius_mm: Radius R of the disks, whose edges meet where a segment of the rod bends far [mm]; ``None``
             stands for ``offset_mm``. The paper's model shears before its segments bend so far.
         disk_thickness_mm: Thickness t of the disks [mm].
@@ -52,35 +66,37 @@ class Robot:
     length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0
+    cables: tuple[Cable, ...] = (Cable(),)
+    segment_rigidity: tuple[float, ...] | None = None
+    precurvature: float | tuple[float, ...] = 0.0
+    weight_per_length: tuple[float, float] = (0.0, 0.0)
+    loads: tuple[Load, ...] = ()
     disk_radius_mm: float | None = None
     disk_thickness_mm: float = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self, LINES)
-        if not (isinstance(self.model, str) and self.model in MODELS):
-            raise refusal("model", self.model, f"one of {', '.join(MODELS)}")
+        check_model(self.model)
         self._check_lengths()
         check_proportions(self)
-        self._check_disks()
-        check_point_count(self, len(self.touch) * self.positions)
-        check_cable_limit(self, min(math.pi * self.offset_mm, 0.5 * self.shortest_mm))
-        bound = min(self.shortest_mm, 2 * self.segments * self.offset_mm)
+        check_rod(self, space=2)
+        object.__setattr__(self, "precurvature", checked_precurvature(self, self.precurvature, 1))
+        if self.model == "paper" and self.cables != (Cable(offset_mm=self.offset_mm, end=self.segments),):
+            raise refusal("cables", self.cables, 'one Cable() of the paper\'s model; choose model="rod" for others')
+        check_disks(self)
+        check_point_count(self, len(self.lines_mm) * self.positions)
+        self._check_cable_limit()
+
+    def _check_cable_limit(self) -> None:
+        # The equal shares of the paper's model take from every segment alike, also at its shortest.
+        longest = self.shortest_mm if self.model == "paper" else self.longest_mm
+        check_cable_limit(self, min(math.pi * self.offset_mm, 0.5 * longest))
+        bound = min(longest, 2 * self.segments * self.offset_mm)
         if not self.cable_limit_mm < bound:
             raise ValueError(
                 f"max_cable_mm is {self.max_cable_mm}; it must be below {bound} "
-                "(the backbone's shortest length, and the disks' reach 2·n·a)"
+                f"(the backbone's {'shortest ' if self.model == 'paper' else ''}length, and the disks' reach 2·n·a)"
             )
-
-    def _check_disks(self) -> None:
-        radius = self.offset_mm if self.disk_radius_mm is None else self.disk_radius_mm
-        low, high = (ratio * self.longest_mm for ratio in OFFSETS)
-        bound = f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length"
-        radius = check_number("disk_radius_mm", radius, low, high, bound)
-        most = THICKEST * self.shortest_mm / self.segments
-        bound = f"from 0 to {most:.6g}, {THICKEST} of a segment's length"
-        thickness = check_number("disk_thickness_mm", self.disk_thickness_mm, 0.0, most, bound)
-        object.__setattr__(self, "disk_radius_mm", radius)
-        object.__setattr__(self, "disk_thickness_mm", thickness)
 
     def _check_lengths(self) -> None:
         if self.length_range_mm is None:
@@ -160,8 +176,9 @@ class Robot:
     @property
     def lines_mm(self) -> tuple[float, ...]:
         """Distances of the lines of ``touch`` from the backbone, towards the cable [mm]."""
-        distances = {"backbone": 0.0, "cable": self.offset_mm, "rim": -self.offset_mm}
-        return tuple(distances[line] for line in self.touch)
+        cables = dict.fromkeys(math.copysign(cable.offset_mm or 0.0, cable.hole_mm[0]) for cable in self.cables)
+        distances = {"backbone": (0.0,), "cable": tuple(cables), "rim": (-self.offset_mm,)}
+        return tuple(dict.fromkeys(distance for line in self.touch for distance in distances[line]))
 
     @property
     def positions(self) -> int:
@@ -183,6 +200,11 @@ class Robot:
         return self.rigidity / (2 * self.segment_mm)
 
     @property
+    def least_cable_mm(self) -> float:
+        """Least displacement of a cable: 0 for one alone on a robot that is straight at rest [mm]."""
+        return least_cable_mm(self)
+
+    @property
     def cable_limit_mm(self) -> float:
         """``max_cable_mm`` with its default filled in [mm]."""
         assert self.max_cable_mm is not None
@@ -194,9 +216,8 @@ def _longest_edges(robot: Robot) -> tuple[float, ...]:
     segment = robot.longest_mm / robot.segments
     if robot.model == "rod":
         assert robot.disk_radius_mm is not None
-        widest = min((segment - robot.disk_thickness_mm) / robot.disk_radius_mm, math.pi)
-        angles = [widest * k / ANGLES for k in range(1, ANGLES + 1)]
-        longest = [max(2 * (segment / t + abs(line)) * math.sin(t / 2) for t in angles) for line in robot.lines_mm]
+        widest = widest_bend(segment, robot.disk_radius_mm, robot.disk_thickness_mm)
+        longest = [longest_arc_edge(segment, line, widest) for line in robot.lines_mm]
     else:
         turned = math.sqrt(segment**2 - (segment - robot.cable_limit_mm / robot.segments) ** 2) / robot.offset_mm
         longest = [segment + max(0.0, -line) * turned for line in robot.lines_mm]

@@ -1,5 +1,7 @@
 """Solver in the plane: follows the equilibria of one robot in one scene step by step."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solver import _kernel
@@ -7,11 +9,10 @@ from solver.common.checks import check_clear, check_core, check_origin, check_sc
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import PLANE
+from solver.common.rod import check_cables, kernel_rod
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
-from solver.common.validation import check_number
 from solver.planar.equilibrium import Equilibrium
-from solver.planar.layout import layout, layout_model
 from solver.planar.robot import Robot
 
 
@@ -22,21 +23,20 @@ class CommandCheck:
     scene: Scene
 
     def check_command(
-        self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None
-    ) -> tuple[float, float]:
-        """Return a command as floats, with the present length where none is given.
+        self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None
+    ) -> tuple[float, ...]:
+        """Return a command as floats, cables and length, with the present length where none is given.
 
         Raises:
             ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one of the plane.
         """
-        limit = self.robot.cable_limit_mm
-        if not (type(cable_mm) is float and 0 < cable_mm <= limit):
-            cable_mm = check_number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
+        if type(cable_mm) is float and 0 < cable_mm <= self.robot.cable_limit_mm and len(self.robot.cables) == 1:
+            cables: tuple[float, ...] = (cable_mm,)
+        else:
+            cables = check_cables(self.robot, cable_mm)
         check_origin(self.robot, self.scene, equilibrium, Equilibrium)
-        if length_mm is None:
-            return cable_mm, equilibrium.length_mm
-        return cable_mm, self.robot.check_length(length_mm)
+        return *cables, equilibrium.length_mm if length_mm is None else self.robot.check_length(length_mm)
 
 
 class Solver(CommandCheck):
@@ -57,26 +57,32 @@ class Solver(CommandCheck):
     """
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
-        check_scene(robot, Robot, scene, PLANE)
+        check_scene(robot, Robot, scene, 2)
         self.robot = robot
         self.scene = scene
         check_core(robot, scene)
         self._kernel = _kernel.Kernel(kernel_robot(robot), kernel_scene(robot, scene))
-        straight = np.zeros(self._kernel.block_size)
-        straight[layout(robot, len(scene)).length.at] = robot.length_mm
-        self._rest = self._follow(straight, 0.0, robot.length_mm)
+        block = np.empty(self._kernel.block_size)
+        work = self._kernel.rest(robot.length_mm, block)
+        self._rest = Equilibrium.solved(robot, scene, block, *work)
         check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> Equilibrium:
-        """Return the straight, unactuated robot."""
+        """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature.
+
+        A cable that would hold a precurved robot back is paid out until it just does not.
+        """
         return self._rest
 
-    def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
-        """Move the cable to a displacement, and the base to an insertion, as far as tension and obstacles allow.
+    def step(
+        self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None
+    ) -> Equilibrium:
+        """Move the cables to displacements, and the base to an insertion, as far as tension and obstacles allow.
 
         Args:
             equilibrium: State to start from, of this solver or one of an equal robot and scene.
-            cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
+            cable_mm: Commanded cable displacement, of several cables one each, from ``robot.least_cable_mm`` to
+                ``robot.max_cable_mm`` [mm]. A negative one pays the cable out.
             length_mm: Commanded length of the backbone, within ``robot.length_range_mm`` [mm]; ``None`` keeps it. Both
                 are changed at proportional rates.
 
@@ -89,10 +95,14 @@ class Solver(CommandCheck):
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one of the plane.
         """
-        cable_mm, length_mm = self.check_command(equilibrium, cable_mm, length_mm)
-        return self._follow(equilibrium.block, cable_mm, length_mm)
+        reached = np.empty_like(equilibrium.block)
+        command = self.check_command(equilibrium, cable_mm, length_mm)
+        work = self._kernel.step(equilibrium.block, command, reached)
+        return Equilibrium.solved(self.robot, self.scene, reached, *work)
 
-    def trace(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Trace:
+    def trace(
+        self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None
+    ) -> Trace:
         """Return every shape accepted on the way of :meth:`step`, beginning with the present one.
 
         It shows what happens within a step: its sub-steps, and the descent through a snap.
@@ -100,8 +110,8 @@ class Solver(CommandCheck):
         Raises:
             ValueError: As :meth:`step`.
         """
-        cable_mm, length_mm = self.check_command(equilibrium, cable_mm, length_mm)
-        return read_trace(self._kernel.trace(equilibrium.block, (cable_mm, length_mm)), self.robot, self.scene, 2)
+        command = self.check_command(equilibrium, cable_mm, length_mm)
+        return read_trace(self._kernel.trace(equilibrium.block, command), self.robot, self.scene, 2)
 
     def optimality(self, equilibrium: Equilibrium) -> Optimality:
         """Return the optimality residuals of an equilibrium, recomputed by the kernel.
@@ -112,16 +122,11 @@ class Solver(CommandCheck):
         check_origin(self.robot, self.scene, equilibrium, Equilibrium)
         return Optimality(*self._kernel.optimality(equilibrium.block))
 
-    def _follow(self, block: np.ndarray, cable_mm: float, length_mm: float) -> Equilibrium:
-        reached = np.empty_like(block)
-        work = self._kernel.step(block, cable_mm, length_mm, reached)
-        return Equilibrium.solved(self.robot, self.scene, reached, *work)
-
 
 def kernel_robot(robot: Robot) -> _kernel.Robot:
     """A robot as the kernel takes it."""
     return _kernel.Robot(
-        model=layout_model(robot).kind,
+        model=PLANE[robot.model].kind,
         segments=robot.segments,
         offset=robot.offset_mm,
         angle=0.0,
@@ -133,7 +138,15 @@ def kernel_robot(robot: Robot) -> _kernel.Robot:
         lines=[(line, 0.0) for line in robot.lines_mm],
         edges=list(robot.edges_mm),
         between=robot.between,
+        rod=_kernel_rod(robot) if robot.model == "rod" else _kernel.Rod(),
     )
+
+
+def _kernel_rod(robot: Robot) -> _kernel.Rod:
+    stiffness = np.ones(robot.segments)
+    if robot.segment_rigidity is not None:
+        stiffness = np.array(robot.segment_rigidity) / robot.rigidity
+    return kernel_rod(robot, stiffness, np.array(robot.precurvature))
 
 
 def kernel_scene(robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from solver import _kernel
 from solver.common.batch import RobotBatch
-from solver.common.layout import SPACE, Layout
+from solver.common.layout import Layout
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
@@ -18,7 +18,7 @@ class SpatialBatchSolver(RobotBatch[SpatialRobot, SpatialEquilibrium]):
     See :class:`~solver.common.batch.RobotBatch`.
     """
 
-    model = SPACE
+    space = 3
     robot_kind = SpatialRobot
 
     def _straight_points(self) -> np.ndarray:

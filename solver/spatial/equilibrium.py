@@ -97,4 +97,5 @@ def touching_points(robot: SpatialRobot, nodes: np.ndarray, frames: np.ndarray) 
 
 def spatial_layout(robot: SpatialRobot, obstacles: int) -> Layout:
     """Return the layout for a robot among a number of obstacles."""
-    return make_layout(SPACE, robot.segments, robot.lines, robot.positions, obstacles)
+    sizes = robot.segments, len(robot.cables), robot.lines, robot.positions
+    return make_layout(SPACE[robot.model], *sizes, obstacles)

@@ -8,7 +8,6 @@ import numpy as np
 from solver.common.checks import check_clear, check_core, check_scene
 from solver.common.geometry import touchable_points
 from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP, nlp_solver
-from solver.common.layout import SPACE
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
@@ -31,7 +30,7 @@ class SpatialReferenceSolver(SpatialCommandCheck):
     """
 
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
-        check_scene(robot, SpatialRobot, scene, SPACE)
+        check_scene(robot, SpatialRobot, scene, 3)
         self.robot, self.scene = robot, scene
         check_core(robot, scene)
         self._touchable = touchable_points(robot, scene)

@@ -2,14 +2,25 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from solver.common.robot import check_cable_limit, check_fields, check_point_count, check_proportions
-from solver.common.validation import check_finite, check_whole
+from solver.common.robot import (
+    check_cable_limit,
+    check_disks,
+    check_fields,
+    check_model,
+    check_point_count,
+    check_proportions,
+    longest_arc_edge,
+    widest_bend,
+)
+from solver.common.rod import Cable, Load, check_rod, checked_precurvature, filled_in
+from solver.common.validation import check_finite, check_number, check_whole, is_listed, refusal
 
 LINES = ("backbone", "holes", "rim")
+TORSIONS = (0.01, 100.0)  # GJ over EI
 LEAST_SINE = math.sin(math.radians(30) - 1e-9)  # of the angle between the cables
 
 
@@ -22,21 +33,35 @@ def sides(cables_mm: np.ndarray) -> np.ndarray:
 class SpatialRobot:
     """A cable-driven continuum robot in space, clamped at the origin and pointing along +z.
 
-    Two pairs of cables run through its disks: the first cable at the angle 0 from +x, the second at ``angle``, and one
-    opposite to each. A positive displacement pulls the first cable of a pair, a negative one its opposite; the other
-    cable of the pair is slack and exerts no force.
+    In the paper's model two pairs of cables run through its disks: the first cable at the angle 0 from +x, the second
+    at ``angle``, and one opposite to each. A positive displacement pulls the first cable of a pair, a negative one its
+    opposite; the other cable of the pair is slack and exerts no force. The rod has single cables, as many as are given,
+    each with a displacement of its own, which pays it out where it is negative.
 
     Attributes:
         length_mm: Length of the backbone, L0 [mm].
         segments: Number of segments n; nodes are 0 (clamped) to n.
         offset_mm: Distance a of the cables from the backbone [mm].
+        model: ``"paper"``, eq. 13: every segment takes an equal share of both displacements and may shear. ``"rod"``:
+            cables slide through the disks without friction and can go slack, and segments are arcs that bend and twist;
+            with more segments this robot converges to the Kirchhoff rod under tendon tension.
         angle: Angle from the first cable to the second, about +z [rad]; 30° to 150° either way.
+        cables: Cables of the rod, each a :class:`solver.Cable`; ``None`` stands for one at 0 and one at ``angle``.
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tensions, never the shape.
         max_tension: Tension the motor of a cable can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest displacement of a cable [mm]; ``None`` stands for π·a / 2, which turns the tip by 90°,
             but at most half the length.
-        touch: Lines whose points can touch obstacles: ``"backbone"``, ``"holes"`` (those of all four cables), and
-            ``"rim"``, points of the edge of the disks.
+        torsion_ratio: GJ over EI of the rod, one number or one for each segment; 0.77 is that of a round solid section
+            with Poisson's ratio 0.3.
+        segment_rigidity: EI of each segment of the rod [N·mm²]; ``None`` for ``rigidity`` in all.
+        precurvature: Rotation vector of each segment of the rod at rest, one for all or each its own [rad].
+        weight_per_length: Weight of a unit of length of the rod [N/mm], half of a segment's at each of its nodes.
+        loads: Dead loads on disks of the rod, each a :class:`solver.Load`.
+        disk_radius_mm: Radius R of the disks, whose edges meet where a segment of the rod bends far [mm]; ``None``
+            stands for ``offset_mm``.
+        disk_thickness_mm: Thickness t of the disks [mm].
+        touch: Lines whose points can touch obstacles: ``"backbone"``, ``"holes"`` (those of all cables, in the paper's
+            model four), and ``"rim"``, points of the edge of the disks.
         rim_points: Number of points of the rim, evenly spaced from +x on.
         between: Number of further points of each line, evenly spaced between every two nodes, that can touch.
 
@@ -54,9 +79,19 @@ class SpatialRobot:
     touch: tuple[str, ...] = ("backbone", "holes")
     rim_points: int = 16
     between: int = 0
+    model: Literal["paper", "rod"] = "paper"
+    cables: tuple[Cable, ...] | None = None
+    torsion_ratio: float | tuple[float, ...] = 0.77
+    segment_rigidity: tuple[float, ...] | None = None
+    precurvature: tuple[float, ...] | tuple[tuple[float, ...], ...] = (0.0, 0.0, 0.0)
+    weight_per_length: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    loads: tuple[Load, ...] = ()
+    disk_radius_mm: float | None = None
+    disk_thickness_mm: float = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self, LINES)
+        check_model(self.model)
         object.__setattr__(self, "angle", check_finite("angle", self.angle))
         if abs(math.sin(self.angle)) < LEAST_SINE:
             raise ValueError(
@@ -65,8 +100,29 @@ class SpatialRobot:
             )
         object.__setattr__(self, "rim_points", check_whole("rim_points", self.rim_points, 3, 64))
         check_proportions(self)
+        self._check_rod()
+        check_disks(self)
         check_point_count(self, self.lines * self.positions)
-        check_cable_limit(self, min(math.pi * self.offset_mm, self.length_mm) / 2)
+        self._check_cable_limit()
+
+    def _check_rod(self) -> None:
+        assign, paper = object.__setattr__, (Cable(), Cable(angle=self.angle))
+        if self.model == "paper" and self.cables is not None and tuple(self.cables) != filled_in(self, paper, 3):
+            raise refusal("cables", self.cables, 'None in the paper\'s model; choose model="rod" to name them')
+        if self.cables is None:
+            assign(self, "cables", paper)
+        check_rod(self, space=3)
+        assign(self, "precurvature", checked_precurvature(self, self.precurvature, 3))
+        ratios = self.torsion_ratio if is_listed(self.torsion_ratio) else [self.torsion_ratio] * self.segments
+        bound = f"from {TORSIONS[0]} to {TORSIONS[1]}, one number or one for each of the {self.segments} segments"
+        if len(ratios) != self.segments:
+            raise refusal("torsion_ratio", self.torsion_ratio, bound)
+        assign(self, "torsion_ratio", tuple(check_number("torsion_ratio", ratio, *TORSIONS, bound) for ratio in ratios))
+
+    def _check_cable_limit(self) -> None:
+        check_cable_limit(self, min(math.pi * self.offset_mm, self.length_mm) / (2 if self.model == "paper" else 1))
+        if self.model == "rod":
+            return
         bound = min(self.length_mm, self.segments * self.offset_mm * abs(math.sin(self.angle)))
         if not self.cable_limit_mm < bound:
             raise ValueError(
@@ -100,13 +156,21 @@ class SpatialRobot:
         return np.array([[self.offset_mm, 0.0, 0.0], turned])
 
     @property
+    def cable_holes_mm(self) -> np.ndarray:
+        """Where cables cross the disks, those opposite in the paper's model included, ``(h, 2)`` [mm]."""
+        if self.model == "paper":
+            first, second = self.holes[:, :2]
+            return np.array([first, second, -first, -second])
+        assert self.cables is not None
+        return np.array(list(dict.fromkeys(cable.hole_mm for cable in self.cables)))
+
+    @property
     def lines_mm(self) -> np.ndarray:
         """Positions on the disk of the lines of ``touch``, ``(p, 2)`` [mm]."""
-        first, second = self.holes[:, :2]
         turns = 2 * math.pi / self.rim_points * np.arange(self.rim_points)
         positions = {
             "backbone": np.zeros((1, 2)),
-            "holes": np.array([first, second, -first, -second]),
+            "holes": self.cable_holes_mm,
             "rim": self.offset_mm * np.column_stack([np.cos(turns), np.sin(turns)]),
         }
         return np.concatenate([positions[line] for line in self.touch])
@@ -119,8 +183,13 @@ class SpatialRobot:
     @property
     def lines(self) -> int:
         """Number of lines of points."""
-        counts = {"backbone": 1, "holes": 4, "rim": self.rim_points}
+        counts = {"backbone": 1, "holes": len(self.cable_holes_mm), "rim": self.rim_points}
         return sum(counts[line] for line in self.touch)
+
+    @property
+    def least_cable_mm(self) -> float:
+        """Least displacement of a cable [mm]."""
+        return -self.cable_limit_mm
 
     @property
     def positions(self) -> int:
@@ -146,8 +215,14 @@ class SpatialRobot:
     def edges_mm(self) -> tuple[float, ...]:
         """Largest possible distance between neighbouring points of each line [mm].
 
-        A segment shears at most up to where its cable has no more length to give.
+        A segment of the paper's model shears at most up to where its cable has no more length to give; one of the rod
+        bends and twists at most up to where its disks meet.
         """
+        if self.model == "rod":
+            assert self.disk_radius_mm is not None
+            reaches = np.linalg.norm(self.lines_mm, axis=1)
+            widest = widest_bend(self.segment_mm, self.disk_radius_mm, self.disk_thickness_mm)
+            return tuple(longest_arc_edge(self.segment_mm, reach, widest) / (self.between + 1) for reach in reaches)
         segment, shared = self.segment_mm, self.cable_limit_mm / self.segments
         turned = math.sqrt(segment**2 - (segment - shared) ** 2)
         stretched = np.abs(self.line_weights).sum(axis=1) * turned

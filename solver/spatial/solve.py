@@ -1,5 +1,7 @@
 """Solver in space: follows the equilibria of one robot in one scene step by step."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solver import _kernel
@@ -7,10 +9,10 @@ from solver.common.checks import check_clear, check_core, check_origin, check_sc
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import SPACE
+from solver.common.rod import check_cables, kernel_rod
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
-from solver.common.validation import check_number, check_sequence, refusal
-from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout
+from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import SpatialRobot
 
 
@@ -21,24 +23,17 @@ class SpatialCommandCheck:
     scene: Scene
 
     def check_command(
-        self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray
+        self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray
     ) -> tuple[float, ...]:
-        """Return a command as two floats.
+        """Return commanded displacements as floats.
 
         Raises:
             ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one in space.
         """
-        limit = self.robot.cable_limit_mm
-        bound = f"a pair, both within ±{limit:.6g} (robot.max_cable_mm)"
-        cables = [
-            check_number("an entry of cables_mm", cable, -limit, limit, bound)
-            for cable in check_sequence("cables_mm", cables_mm, bound)
-        ]
-        if len(cables) != 2:
-            raise refusal("cables_mm", cables_mm, bound)
+        cables = check_cables(self.robot, cables_mm)
         check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
-        return tuple(cables)
+        return cables
 
 
 class SpatialSolver(SpatialCommandCheck):
@@ -58,28 +53,31 @@ class SpatialSolver(SpatialCommandCheck):
     """
 
     def __init__(self, robot: SpatialRobot, scene: Scene) -> None:
-        check_scene(robot, SpatialRobot, scene, SPACE)
+        check_scene(robot, SpatialRobot, scene, 3)
         self.robot, self.scene = robot, scene
         check_core(robot, scene)
         self._kernel = _kernel.SpatialKernel(kernel_robot(robot), kernel_scene(robot, scene))
-        straight = np.zeros(self._kernel.block_size)
-        straight[spatial_layout(robot, len(scene)).length.at] = robot.length_mm
-        self._rest = self._follow(straight, np.zeros(2))
+        block = np.empty(self._kernel.block_size)
+        work = self._kernel.rest(robot.length_mm, block)
+        self._rest = SpatialEquilibrium.solved(robot, scene, block, *work)
         check_clear(robot, scene, self._rest.gaps)
 
     def rest(self) -> SpatialEquilibrium:
-        """Return the straight, unactuated robot."""
+        """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature.
+
+        A cable that would hold a precurved robot back is paid out until it just does not.
+        """
         return self._rest
 
-    def step(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> SpatialEquilibrium:
+    def step(self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray) -> SpatialEquilibrium:
         """Move both pairs of cables to displacements, at proportional rates, as far as tension and obstacles allow.
 
         A cable whose tension reaches the limit stops there, while the other moves on.
 
         Args:
             equilibrium: State to start from, of this solver or one of an equal robot and scene.
-            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm]; the sign selects the
-                cable of the pair that is pulled.
+            cables_mm: Displacement of each cable, within ±``robot.max_cable_mm`` [mm]; a negative one pays it out. In
+                the paper's model that of each pair, whose sign selects the cable that is pulled.
 
         Returns:
             The equilibrium reached; its ``status`` says how. While anything touches, the cables are not slackened
@@ -89,17 +87,19 @@ class SpatialSolver(SpatialCommandCheck):
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one in space.
         """
-        cables = np.array(self.check_command(equilibrium, cables_mm))
-        return self._follow(equilibrium.block, cables)
+        reached = np.empty_like(equilibrium.block)
+        command = (*self.check_command(equilibrium, cables_mm), self.robot.length_mm)
+        work = self._kernel.step(equilibrium.block, command, reached)
+        return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
 
-    def trace(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> Trace:
+    def trace(self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray) -> Trace:
         """Return every shape accepted on the way of :meth:`step`, beginning with the present one.
 
         Raises:
             ValueError: As :meth:`step`.
         """
-        cables = np.array(self.check_command(equilibrium, cables_mm))
-        shapes = self._kernel.trace(equilibrium.block, (*cables, self.robot.length_mm))
+        command = (*self.check_command(equilibrium, cables_mm), self.robot.length_mm)
+        shapes = self._kernel.trace(equilibrium.block, command)
         return read_trace(shapes, self.robot, self.scene, 3)
 
     def optimality(self, equilibrium: SpatialEquilibrium) -> Optimality:
@@ -111,29 +111,32 @@ class SpatialSolver(SpatialCommandCheck):
         check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
         return Optimality(*self._kernel.optimality(equilibrium.block))
 
-    def _follow(self, block: np.ndarray, cables: np.ndarray) -> SpatialEquilibrium:
-        reached = np.empty_like(block)
-        first, second = cables.tolist()
-        work = self._kernel.step(block, first, second, self.robot.length_mm, reached)
-        return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
-
 
 def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
     """A robot as the kernel takes it."""
     return _kernel.Robot(
-        model=SPACE.kind,
+        model=SPACE[robot.model].kind,
         segments=robot.segments,
         offset=robot.offset_mm,
         angle=robot.angle,
         rigidity=robot.rigidity,
         max_tension=robot.max_tension,
         max_length=robot.length_mm,
-        disk_radius=robot.offset_mm,
-        disk_thickness=0.0,
+        disk_radius=robot.disk_radius_mm or robot.offset_mm,
+        disk_thickness=robot.disk_thickness_mm,
         lines=robot.lines_mm.tolist(),
         edges=list(robot.edges_mm),
         between=robot.between,
+        rod=_kernel_rod(robot) if robot.model == "rod" else _kernel.Rod(),
     )
+
+
+def _kernel_rod(robot: SpatialRobot) -> _kernel.Rod:
+    bending = np.ones(robot.segments)
+    if robot.segment_rigidity is not None:
+        bending = np.array(robot.segment_rigidity) / robot.rigidity
+    stiffness = np.column_stack([bending, bending, bending * np.array(robot.torsion_ratio)])
+    return kernel_rod(robot, stiffness, np.array(robot.precurvature))
 
 
 def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:

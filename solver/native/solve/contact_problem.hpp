@@ -142,6 +142,10 @@ class ContactProblem {
   int mount_of(int obstacle) const { return mount_of_[obstacle]; }
   const Mat<kSpace, kSpace>& spring(int mount) const { return springs_[mount]; }  // stiffness over the energy scale
   const std::vector<Position>& mount_gradient() const { return mount_gradient_; }
+  double taken(int cable) const {  // length that the bending takes up from a cable of a rod [mm]
+    if constexpr (Model::kRod) return model_.cables().slack(cable, 0);
+    return 0;
+  }
   int slack_contact(int cable) const { return contacts() + cable; }
   bool is_slack(int contact) const { return contact >= contacts() && contact < first_disk_contact(); }
   int first_disk_contact() const { return contacts() + (Model::kRod ? static_cast<int>(robot_.rod.cables.size()) : 0); }

@@ -39,8 +39,8 @@ class Continuation {
 
   virtual void set_interruption(Interruption interruption) = 0;
 
-  // Writes the equilibrium of the robot at a length with no cable displaced: from its shape without loads, these are
-  // raised evenly.
+  // Writes the equilibrium of the robot at a length with no cable displaced. From its shape without loads, these are
+  // raised evenly; a cable that is too short for that shape is paid out.
   virtual StepResult rest(double length, double* to) = 0;
 
   // Takes the robot from the equilibrium in one block towards the command `target`, cables and length evenly, and

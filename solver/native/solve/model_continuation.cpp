@@ -299,12 +299,14 @@ StepResult ModelContinuation<Model>::rest(double length, double* to) {
   std::fill(present_.mounts.begin(), present_.mounts.end(), Position{});
   clear_trend();
   evaluate_present();
+  for (int k = 0; Model::kRod && k < static_cast<int>(layout_.cables.size); ++k)
+    present_.command.cables[k] = std::min(0.0, problem_.taken(k));
   for (std::size_t i = 0; i < nodes_.size(); ++i) std::copy_n(problem_.states()[i].v.begin(), kSpace, nodes_[i].v.begin());
   problem_.update_broadphase(nodes_, present_.mounts);
   problem_.evaluate(present_);
   points_ = problem_.points();
   mounts_ = present_.mounts;
-  result_.status = problem_.violation() > 0 ? Status::kGaveUp : pursue({{}, length});
+  result_.status = problem_.violation() > 0 ? Status::kGaveUp : pursue({present_.command.cables, length});
   return finish(present_.command, to);
 }
 

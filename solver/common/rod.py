@@ -1,0 +1,288 @@
+"""What a rod has beyond a robot of the paper's model: its cables, segments unlike each other, precurvature and loads."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from solver import _kernel
+from solver.common.robot import OFFSETS, AnyRobot
+from solver.common.validation import (
+    check_finite,
+    check_instance,
+    check_number,
+    check_point,
+    check_positive,
+    check_sequence,
+    check_whole,
+    is_listed,
+    refusal,
+)
+
+MAX_CABLES = _kernel.MAX_CABLES
+STIFFNESSES = (1e-3, 1e3)  # of a segment, over the robot's rigidity
+MOST_LOAD = 1e4  # a load or the whole weight, over EI/L²
+MOST_TURN = 1.5  # precurvature of a segment [rad]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cable:
+    """A cable that runs straight from disk to disk, from the base to the disk where it ends.
+
+    Attributes:
+        angle: Direction of its holes from the backbone, from +x on [rad]; in the plane 0 or π.
+        offset_mm: Distance of its holes from the backbone [mm]; ``None`` stands for the robot's ``offset_mm``.
+        end: Node of its last disk; ``None`` stands for the tip.
+
+    Raises:
+        ValueError: If a value is not finite, or out of range.
+    """
+
+    angle: float = 0.0
+    offset_mm: float | None = None
+    end: int | None = None
+
+    def __post_init__(self) -> None:
+        assign = object.__setattr__
+        assign(self, "angle", check_finite("angle of a cable", self.angle, 1e3))
+        if self.offset_mm is not None:
+            assign(self, "offset_mm", check_positive("offset_mm of a cable", self.offset_mm))
+        if self.end is not None:
+            assign(self, "end", check_whole("end of a cable", self.end, 1, 4096))
+
+    @property
+    def hole_mm(self) -> tuple[float, float]:
+        """Where the cable crosses the disks, from the backbone [mm]."""
+        assert self.offset_mm is not None
+        return self.offset_mm * math.cos(self.angle), self.offset_mm * math.sin(self.angle)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Load:
+    """A dead load on the disk of a node: it keeps its direction in the base frame while the disk turns.
+
+    Attributes:
+        node: Node of the disk, from 1 on.
+        force: Force [N].
+        moment: Moment, counter-clockwise, in the plane only [N·mm]; in space a couple of two forces takes its place.
+        offset_mm: Distance from the backbone of the point of the disk where the force acts [mm].
+        angle: Direction of that point from the backbone, from +x on [rad]; in the plane 0 or π.
+
+    Raises:
+        ValueError: If a value is not finite, or out of range.
+    """
+
+    node: int
+    force: tuple[float, ...]
+    moment: float = 0.0
+    offset_mm: float = 0.0
+    angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        assign = object.__setattr__
+        assign(self, "node", check_whole("node of a load", self.node, 1, 4096))
+        space = len(check_sequence("force of a load", self.force, "two or three numbers"))
+        assign(self, "force", check_point("force of a load", self.force, 3 if space == 3 else 2))
+        assign(self, "moment", check_finite("moment of a load", self.moment))
+        assign(self, "offset_mm", check_number("offset_mm of a load", self.offset_mm, 0.0, 1e30, "not negative"))
+        assign(self, "angle", check_finite("angle of a load", self.angle, 1e3))
+
+    @property
+    def place_mm(self) -> tuple[float, float]:
+        """Point of the disk where the force acts, from the backbone [mm]."""
+        return self.offset_mm * math.cos(self.angle), self.offset_mm * math.sin(self.angle)
+
+
+class AnyRod(AnyRobot, Protocol):
+    """A robot whose model may be the rod; see :class:`solver.Robot` for its fields."""
+
+    @property
+    def cables(self) -> Sequence[Cable]:
+        """The cables, with offset and end filled in."""
+
+    @property
+    def precurvature(self) -> Sequence[float] | Sequence[Sequence[float]]:
+        """Angles of each segment at rest [rad]."""
+
+    @property
+    def segment_rigidity(self) -> Sequence[float] | None:
+        """EI of each segment [N·mm²]."""
+
+    @property
+    def weight_per_length(self) -> Sequence[float]:
+        """Weight of a unit of length [N/mm]."""
+
+    @property
+    def loads(self) -> Sequence[Load]:
+        """Dead loads on disks."""
+
+
+def check_rod(robot: AnyRod, space: int) -> None:
+    """Check the fields of a rod, and fill in offset and end of its cables; of the paper's model, that it has none.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+        TypeError: If a cable or a load is of another class.
+    """
+    assign = object.__setattr__
+    assign(robot, "cables", _checked_cables(robot, space))
+    assign(robot, "loads", _checked_loads(robot, space))
+    assign(robot, "weight_per_length", _checked_weight(robot, space))
+    if robot.segment_rigidity is not None:
+        assign(robot, "segment_rigidity", _each_segment(robot, "segment_rigidity", robot.segment_rigidity))
+        low, high = (ratio * robot.rigidity for ratio in STIFFNESSES)
+        bound = f"from {low:.6g} to {high:.6g}, {STIFFNESSES} of rigidity"
+        for rigidity in robot.segment_rigidity:
+            check_number("an entry of segment_rigidity", rigidity, low, high, bound)
+    if robot.model == "paper":
+        _check_paper(robot)
+
+
+def _check_paper(robot: AnyRod) -> None:
+    for name, given in (
+        ("segment_rigidity", robot.segment_rigidity is not None),
+        ("loads", bool(robot.loads)),
+        ("weight_per_length", any(robot.weight_per_length)),
+    ):
+        if given:
+            raise ValueError(f'{name} is given; the paper\'s model has none: choose model="rod"')
+
+
+def _checked_cables(robot: AnyRod, space: int) -> tuple[Cable, ...]:
+    bound = f"one to {MAX_CABLES} of solver.Cable"
+    cables = check_sequence("cables", robot.cables, bound)
+    if not 1 <= len(cables) <= MAX_CABLES:
+        raise refusal("cables", robot.cables, bound)
+    for cable in cables:
+        check_instance("a cable", cable, Cable, "make it by Cable(angle=…, offset_mm=…, end=…)")
+    return filled_in(robot, cables, space)  # type: ignore[arg-type]
+
+
+def filled_in(robot: AnyRod, cables: Sequence[Cable], space: int) -> tuple[Cable, ...]:
+    """Return cables with offset and end filled in.
+
+    Raises:
+        ValueError: If one does not fit the robot.
+    """
+    filled = []
+    for cable in cables:
+        offset = robot.offset_mm if cable.offset_mm is None else cable.offset_mm
+        low, high = OFFSETS[0] * robot.longest_mm, robot.offset_mm
+        check_number("offset_mm of a cable", offset, low, high, f"from {low:.6g} to that of the robot, {high:.6g}")
+        if space == 2:
+            _check_side("angle of a cable", cable.angle)
+        end = check_whole("end of a cable", robot.segments if cable.end is None else cable.end, 1, robot.segments)
+        filled.append(replace(cable, offset_mm=offset, end=end))
+    return tuple(filled)
+
+
+def _check_side(name: str, angle: float) -> None:
+    if abs(math.sin(angle)) > 1e-9:
+        raise refusal(name, angle, "0 or π in the plane")
+
+
+def _checked_loads(robot: AnyRod, space: int) -> tuple[Load, ...]:
+    loads = check_sequence("loads", robot.loads, "a sequence of solver.Load")
+    most = MOST_LOAD * robot.rigidity / robot.longest_mm**2
+    for load in loads:
+        check_instance("a load", load, Load, "make it by Load(node=…, force=…)")
+        assert isinstance(load, Load)
+        check_whole("node of a load", load.node, 1, robot.segments)
+        if len(load.force) != space:
+            raise refusal("force of a load", load.force, f"{space} numbers for this robot")
+        bound = f"at most {most:.6g} N in size, {MOST_LOAD:g} of EI/L²"
+        check_number("a force of a load", math.hypot(*load.force), 0.0, most, bound)
+        if space == 3 and load.moment:
+            raise refusal("moment of a load", load.moment, "0 in space: take two forces")
+        check_number("moment of a load", abs(load.moment), 0.0, most * robot.longest_mm, f"{bound} times L")
+        if space == 2 and load.offset_mm:
+            _check_side("angle of a load", load.angle)
+    return tuple(loads)  # type: ignore[arg-type]
+
+
+def _checked_weight(robot: AnyRod, space: int) -> tuple[float, ...]:
+    weight = check_point("weight_per_length", robot.weight_per_length, space)
+    most = MOST_LOAD * robot.rigidity / robot.longest_mm**3
+    check_number("weight_per_length", math.hypot(*weight), 0.0, most, f"at most {most:.6g} N/mm, {MOST_LOAD:g} of EI/L³")
+    return weight
+
+
+def _each_segment(robot: AnyRod, name: str, value: object) -> tuple[float, ...]:
+    """Return numbers of the segments as a tuple of floats."""
+    bound = f"a number for each of the {robot.segments} segments"
+    entries = check_sequence(name, value, bound)
+    if len(entries) != robot.segments:
+        raise refusal(name, value, bound)
+    return tuple(check_finite(f"an entry of {name}", entry) for entry in entries)
+
+
+def checked_precurvature(robot: AnyRod, value: object, numbers: int) -> tuple[float, ...] | tuple[tuple[float, ...], ...]:
+    """Return the angles of the segments at rest: one for each segment, in space three, given once or for each.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    if numbers == 1:
+        each = value if is_listed(value) else [value] * robot.segments
+        angles = _each_segment(robot, "precurvature", each)
+        flat = angles
+    else:
+        rows = check_sequence("precurvature", value, "a rotation vector, or one for each segment")
+        rows = rows if rows and is_listed(rows[0]) else [value] * robot.segments
+        if len(rows) != robot.segments:
+            raise refusal("precurvature", value, f"a rotation vector for each of the {robot.segments} segments")
+        angles = tuple(check_point("an entry of precurvature", row, 3) for row in rows)  # type: ignore[assignment]
+        flat = tuple(math.hypot(*row) for row in angles)  # type: ignore[misc]
+    for angle in flat:
+        check_number("an angle of precurvature", abs(angle), 0.0, MOST_TURN, f"at most {MOST_TURN} rad in size")
+    if robot.model == "paper" and any(flat):
+        raise ValueError('precurvature is given; the paper\'s model has none: choose model="rod"')
+    return angles
+
+
+def least_cable_mm(robot: AnyRod) -> float:
+    """Return the least displacement of a cable: 0 for one alone on a robot that is straight at rest [mm]."""
+    return 0.0 if len(robot.cables) == 1 and not np.any(robot.precurvature) else -robot.cable_limit_mm
+
+
+def check_cables(robot: AnyRobot, cables_mm: object) -> tuple[float, ...]:
+    """Return commanded displacements of the cables as floats; of a single cable it may be a number.
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    count, low, high = len(robot.cables), robot.least_cable_mm, robot.cable_limit_mm
+    bound = f"from {low:.6g} to {high:.6g} (robot.max_cable_mm)"
+    if count == 1 and not is_listed(cables_mm):
+        return (check_number("cable_mm", cables_mm, low, high, bound),)
+    bound = f"{count} numbers, {bound}"
+    entries = check_sequence("cable_mm", cables_mm, bound)
+    if len(entries) != count:
+        raise refusal("cable_mm", cables_mm, bound)
+    return tuple(check_number("an entry of cable_mm", entry, low, high, bound) for entry in entries)
+
+
+def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray) -> _kernel.Rod:
+    """Return what the kernel needs to know of a rod.
+
+    Args:
+        robot: The robot.
+        stiffness: EI, in space also GJ, of each segment over the robot's rigidity, ``(n,)`` or ``(n, 3)``.
+        rest: Angles of each segment at rest, likewise [rad].
+    """
+    weight = (*robot.weight_per_length, 0.0)[:3]
+    loads = [
+        _kernel.Load(node=load.node, at=load.place_mm, force=(*load.force, 0.0)[:3], moment=load.moment)
+        for load in robot.loads
+    ]
+    return _kernel.Rod(
+        holes=[cable.hole_mm for cable in robot.cables],
+        ends=[cable.end or robot.segments for cable in robot.cables],
+        stiffness=np.ascontiguousarray(stiffness, float),
+        rest=np.ascontiguousarray(rest, float),
+        weight=weight,
+        loads=loads,
+        least_pull=least_cable_mm(robot),
+    )
