@@ -2,8 +2,8 @@
 
 from solver.cache.memo import TransitionMemo
 from solver.common.equilibrium import Optimality, Residuals
-from solver.common.rod import Cable, Load
 from solver.common.obstacle import Extent, Obstacle
+from solver.common.rod import Cable, Load
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.common.trace import Trace

@@ -75,7 +75,7 @@ def timed_step(solver: Solver, start: Equilibrium, command: float) -> PlanarStep
     """Return a step and the duration of its compiled call."""
     block = np.empty_like(start.block)
     begin = time.perf_counter_ns()
-    status, iterations, _ = solver._kernel.step(start.block, command, start.length_mm, block)
+    status, iterations, _ = solver._kernel.step(start.block, (command, start.length_mm), block)
     elapsed = (time.perf_counter_ns() - begin) / 1e3
     return Timed(
         solver, start, command, Equilibrium(solver.robot, solver.scene, block, Status(status), iterations), elapsed

@@ -45,9 +45,9 @@ def random_solver(generator: np.random.Generator, robot: SpatialRobot) -> Spatia
 
 def timed_step(solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialStep:
     """Return a step and the duration of its compiled call."""
-    block, (first, second) = np.empty_like(start.block), cables.tolist()
+    block, command = np.empty_like(start.block), [*cables.tolist(), solver.robot.length_mm]
     begin = time.perf_counter_ns()
-    status, iterations, _ = solver._kernel.step(start.block, first, second, solver.robot.length_mm, block)
+    status, iterations, _ = solver._kernel.step(start.block, command, block)
     elapsed = (time.perf_counter_ns() - begin) / 1e3
     end = SpatialEquilibrium(solver.robot, solver.scene, block, Status(status), iterations)
     return Timed(solver, start, cables, end, elapsed)

@@ -1,4 +1,4 @@
-"""What a rod has beyond a robot of the paper's model: its cables, segments unlike each other, precurvature and loads."""
+"""What a rod has beyond a robot of the paper's model: cables, segments unlike each other, precurvature and loads."""
 
 import math
 from collections.abc import Sequence
@@ -103,7 +103,7 @@ class AnyRod(AnyRobot, Protocol):
         """The cables, with offset and end filled in."""
 
     @property
-    def precurvature(self) -> Sequence[float] | Sequence[Sequence[float]]:
+    def precurvature(self) -> object:
         """Angles of each segment at rest [rad]."""
 
     @property
@@ -119,15 +119,20 @@ class AnyRod(AnyRobot, Protocol):
         """Dead loads on disks."""
 
 
-def check_rod(robot: AnyRod, space: int) -> None:
-    """Check the fields of a rod, and fill in offset and end of its cables; of the paper's model, that it has none.
+def check_rod(robot: AnyRod, space: int, usual: tuple[Cable, ...]) -> None:
+    """Check the fields of a rod, and fill in its cables; of a robot of the paper's model, that it has nothing else.
+
+    Args:
+        robot: The robot.
+        space: Dimensions of a point.
+        usual: Cables of the paper's model, which stand for none.
 
     Raises:
         ValueError: Naming the value and the bound.
         TypeError: If a cable or a load is of another class.
     """
     assign = object.__setattr__
-    assign(robot, "cables", _checked_cables(robot, space))
+    assign(robot, "cables", _checked_cables(robot, space, usual))
     assign(robot, "loads", _checked_loads(robot, space))
     assign(robot, "weight_per_length", _checked_weight(robot, space))
     if robot.segment_rigidity is not None:
@@ -137,23 +142,24 @@ def check_rod(robot: AnyRod, space: int) -> None:
         for rigidity in robot.segment_rigidity:
             check_number("an entry of segment_rigidity", rigidity, low, high, bound)
     if robot.model == "paper":
-        _check_paper(robot)
+        _check_paper(robot, filled_in(robot, usual, space))
 
 
-def _check_paper(robot: AnyRod) -> None:
+def _check_paper(robot: AnyRod, usual: tuple[Cable, ...]) -> None:
     for name, given in (
+        ("cables", tuple(robot.cables) != usual),
         ("segment_rigidity", robot.segment_rigidity is not None),
         ("loads", bool(robot.loads)),
         ("weight_per_length", any(robot.weight_per_length)),
     ):
         if given:
-            raise ValueError(f'{name} is given; the paper\'s model has none: choose model="rod"')
+            raise ValueError(f'{name} is given; the paper\'s model has no choice of it: choose model="rod"')
 
 
-def _checked_cables(robot: AnyRod, space: int) -> tuple[Cable, ...]:
-    bound = f"one to {MAX_CABLES} of solver.Cable"
-    cables = check_sequence("cables", robot.cables, bound)
-    if not 1 <= len(cables) <= MAX_CABLES:
+def _checked_cables(robot: AnyRod, space: int, usual: tuple[Cable, ...]) -> tuple[Cable, ...]:
+    bound = f"at most {MAX_CABLES} of solver.Cable"
+    cables = check_sequence("cables", robot.cables, bound) or usual
+    if len(cables) > MAX_CABLES:
         raise refusal("cables", robot.cables, bound)
     for cable in cables:
         check_instance("a cable", cable, Cable, "make it by Cable(angle=…, offset_mm=…, end=…)")
@@ -205,7 +211,9 @@ def _checked_loads(robot: AnyRod, space: int) -> tuple[Load, ...]:
 def _checked_weight(robot: AnyRod, space: int) -> tuple[float, ...]:
     weight = check_point("weight_per_length", robot.weight_per_length, space)
     most = MOST_LOAD * robot.rigidity / robot.longest_mm**3
-    check_number("weight_per_length", math.hypot(*weight), 0.0, most, f"at most {most:.6g} N/mm, {MOST_LOAD:g} of EI/L³")
+    check_number(
+        "weight_per_length", math.hypot(*weight), 0.0, most, f"at most {most:.6g} N/mm, {MOST_LOAD:g} of EI/L³"
+    )
     return weight
 
 
@@ -218,33 +226,43 @@ def _each_segment(robot: AnyRod, name: str, value: object) -> tuple[float, ...]:
     return tuple(check_finite(f"an entry of {name}", entry) for entry in entries)
 
 
-def checked_precurvature(robot: AnyRod, value: object, numbers: int) -> tuple[float, ...] | tuple[tuple[float, ...], ...]:
-    """Return the angles of the segments at rest: one for each segment, in space three, given once or for each.
+def checked_angles(robot: AnyRod, value: object) -> tuple[float, ...]:
+    """Return the angles of the segments at rest in the plane, given once for all or for each [rad].
 
     Raises:
         ValueError: Naming the value and the bound.
     """
-    if numbers == 1:
-        each = value if is_listed(value) else [value] * robot.segments
-        angles = _each_segment(robot, "precurvature", each)
-        flat = angles
-    else:
-        rows = check_sequence("precurvature", value, "a rotation vector, or one for each segment")
-        rows = rows if rows and is_listed(rows[0]) else [value] * robot.segments
-        if len(rows) != robot.segments:
-            raise refusal("precurvature", value, f"a rotation vector for each of the {robot.segments} segments")
-        angles = tuple(check_point("an entry of precurvature", row, 3) for row in rows)  # type: ignore[assignment]
-        flat = tuple(math.hypot(*row) for row in angles)  # type: ignore[misc]
-    for angle in flat:
-        check_number("an angle of precurvature", abs(angle), 0.0, MOST_TURN, f"at most {MOST_TURN} rad in size")
-    if robot.model == "paper" and any(flat):
-        raise ValueError('precurvature is given; the paper\'s model has none: choose model="rod"')
+    angles = _each_segment(robot, "precurvature", value if is_listed(value) else [value] * robot.segments)
+    _check_turns(robot, angles)
     return angles
+
+
+def checked_rotations(robot: AnyRod, value: object) -> tuple[tuple[float, ...], ...]:
+    """Return the rotation vectors of the segments at rest in space, given once for all or for each, ``(n, 3)`` [rad].
+
+    Raises:
+        ValueError: Naming the value and the bound.
+    """
+    bound = f"a rotation vector, or one for each of the {robot.segments} segments"
+    rows = check_sequence("precurvature", value, bound)
+    rows = rows if rows and is_listed(rows[0]) else [rows] * robot.segments
+    if len(rows) != robot.segments:
+        raise refusal("precurvature", value, bound)
+    vectors = tuple(check_point("an entry of precurvature", row, 3) for row in rows)
+    _check_turns(robot, tuple(math.hypot(*vector) for vector in vectors))
+    return vectors
+
+
+def _check_turns(robot: AnyRod, angles: tuple[float, ...]) -> None:
+    for angle in angles:
+        check_number("an angle of precurvature", abs(angle), 0.0, MOST_TURN, f"at most {MOST_TURN} rad in size")
+    if robot.model == "paper" and any(angles):
+        raise ValueError('precurvature is given; the paper\'s model has no choice of it: choose model="rod"')
 
 
 def least_cable_mm(robot: AnyRod) -> float:
     """Return the least displacement of a cable: 0 for one alone on a robot that is straight at rest [mm]."""
-    return 0.0 if len(robot.cables) == 1 and not np.any(robot.precurvature) else -robot.cable_limit_mm
+    return 0.0 if len(robot.cables) == 1 and not np.any(np.asarray(robot.precurvature)) else -robot.cable_limit_mm
 
 
 def check_cables(robot: AnyRobot, cables_mm: object) -> tuple[float, ...]:

@@ -122,7 +122,8 @@ class Kernel {
   }
 
   void require_target(const std::vector<double>& command) const {
-    require(command.size() == layout_.cables.size + 1, "a command must name the displacement of each cable, and length");
+    require(command.size() == layout_.cables.size + 1,
+            "a command must name the displacement of each cable, and length");
     require_command(command.data(), layout_.cables.size);
   }
 

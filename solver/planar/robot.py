@@ -15,7 +15,7 @@ from solver.common.robot import (
     longest_arc_edge,
     widest_bend,
 )
-from solver.common.rod import Cable, Load, check_rod, checked_precurvature, least_cable_mm
+from solver.common.rod import Cable, Load, check_rod, checked_angles, least_cable_mm
 from solver.common.validation import check_number, check_positive, check_sequence, refusal
 
 LINES = ("backbone", "cable", "rim")
@@ -41,8 +41,8 @@ class Robot:
         touch: Lines whose points can touch obstacles: ``"backbone"``, ``"cable"``, those of all cables (both in the
             paper), and ``"rim"``, the edge of the disks on the side of −x.
         between: Number of further points of each line, evenly spaced between every two nodes, that can touch.
-        cables: Cables of the rod, each a :class:`solver.Cable` at the angle 0 (towards +x) or π; the paper's model has
-            one at 0.
+        cables: Cables of the rod, each a :class:`solver.Cable` at the angle 0 (towards +x) or π; none given stand for
+            one at 0, as the paper's model has it.
         segment_rigidity: EI of each segment of the rod [N·mm²]; ``None`` for ``rigidity`` in all.
         precurvature: Angle of each segment of the rod at rest, one number for all or each its own, positive towards +x
             [rad].
@@ -66,7 +66,7 @@ class Robot:
     length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0
-    cables: tuple[Cable, ...] = (Cable(),)
+    cables: tuple[Cable, ...] = ()
     segment_rigidity: tuple[float, ...] | None = None
     precurvature: float | tuple[float, ...] = 0.0
     weight_per_length: tuple[float, float] = (0.0, 0.0)
@@ -79,10 +79,8 @@ class Robot:
         check_model(self.model)
         self._check_lengths()
         check_proportions(self)
-        check_rod(self, space=2)
-        object.__setattr__(self, "precurvature", checked_precurvature(self, self.precurvature, 1))
-        if self.model == "paper" and self.cables != (Cable(offset_mm=self.offset_mm, end=self.segments),):
-            raise refusal("cables", self.cables, 'one Cable() of the paper\'s model; choose model="rod" for others')
+        check_rod(self, 2, (Cable(),))
+        object.__setattr__(self, "precurvature", checked_angles(self, self.precurvature))
         check_disks(self)
         check_point_count(self, len(self.lines_mm) * self.positions)
         self._check_cable_limit()

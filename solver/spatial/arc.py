@@ -33,7 +33,7 @@ def turning_coefficient(square: ca.SX) -> ca.SX:
         value = (-1) ** k / math.factorial(2 * k + 3) + square / 16 * value
     # (1 − sinc t)/t² = (1 − sinc h)/4h² + 2 sinc h (sin(h/2)/t)², h = t/2; sinc h = 2 sin(h)/t
     for part in (square / 4, square):
-        cosine, quarter_sine, _, half_sine = half_rotation(part)
+        _, quarter_sine, _, half_sine = half_rotation(part)
         value = value / 4 + 4 * half_sine * quarter_sine**2
     return value
 
@@ -54,7 +54,8 @@ class _Arc:
         """Backbone in the frame of the lower disk, ``(3,)`` [mm]."""
         x, y, z = ca.vertsplit(self.quarter_sine * self.control)
         w = self.quarter_cosine
-        return self.size * ca.vertcat(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+        tangent = ca.vertcat(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+        return ca.SX(self.size * tangent)
 
     @property
     def rotation(self) -> ca.SX:

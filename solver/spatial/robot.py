@@ -16,7 +16,7 @@ from solver.common.robot import (
     longest_arc_edge,
     widest_bend,
 )
-from solver.common.rod import Cable, Load, check_rod, checked_precurvature, filled_in
+from solver.common.rod import Cable, Load, check_rod, checked_rotations
 from solver.common.validation import check_finite, check_number, check_whole, is_listed, refusal
 
 LINES = ("backbone", "holes", "rim")
@@ -46,7 +46,7 @@ class SpatialRobot:
             cables slide through the disks without friction and can go slack, and segments are arcs that bend and twist;
             with more segments this robot converges to the Kirchhoff rod under tendon tension.
         angle: Angle from the first cable to the second, about +z [rad]; 30° to 150° either way.
-        cables: Cables of the rod, each a :class:`solver.Cable`; ``None`` stands for one at 0 and one at ``angle``.
+        cables: Cables of the rod, each a :class:`solver.Cable`; none given stand for one at 0 and one at ``angle``.
         rigidity: Flexural rigidity EI of the backbone [N·mm²]. It scales forces and tensions, never the shape.
         max_tension: Tension the motor of a cable can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest displacement of a cable [mm]; ``None`` stands for π·a / 2, which turns the tip by 90°,
@@ -80,7 +80,7 @@ class SpatialRobot:
     rim_points: int = 16
     between: int = 0
     model: Literal["paper", "rod"] = "paper"
-    cables: tuple[Cable, ...] | None = None
+    cables: tuple[Cable, ...] = ()
     torsion_ratio: float | tuple[float, ...] = 0.77
     segment_rigidity: tuple[float, ...] | None = None
     precurvature: tuple[float, ...] | tuple[tuple[float, ...], ...] = (0.0, 0.0, 0.0)
@@ -107,13 +107,10 @@ class SpatialRobot:
 
     def _check_rod(self) -> None:
         assign, paper = object.__setattr__, (Cable(), Cable(angle=self.angle))
-        if self.model == "paper" and self.cables is not None and tuple(self.cables) != filled_in(self, paper, 3):
-            raise refusal("cables", self.cables, 'None in the paper\'s model; choose model="rod" to name them')
-        if self.cables is None:
-            assign(self, "cables", paper)
-        check_rod(self, space=3)
-        assign(self, "precurvature", checked_precurvature(self, self.precurvature, 3))
-        ratios = self.torsion_ratio if is_listed(self.torsion_ratio) else [self.torsion_ratio] * self.segments
+        check_rod(self, 3, paper)
+        assign(self, "precurvature", checked_rotations(self, self.precurvature))
+        given = self.torsion_ratio
+        ratios = list(given) if is_listed(given) else [given] * self.segments
         bound = f"from {TORSIONS[0]} to {TORSIONS[1]}, one number or one for each of the {self.segments} segments"
         if len(ratios) != self.segments:
             raise refusal("torsion_ratio", self.torsion_ratio, bound)
@@ -161,7 +158,6 @@ class SpatialRobot:
         if self.model == "paper":
             first, second = self.holes[:, :2]
             return np.array([first, second, -first, -second])
-        assert self.cables is not None
         return np.array(list(dict.fromkeys(cable.hole_mm for cable in self.cables)))
 
     @property

@@ -5,7 +5,7 @@
 #include "model/spatial_paper.hpp"
 #include "model/spatial_rod.hpp"
 
-#define CCR_EACH_MODEL(DO)  \
+#define CCR_EACH_MODEL(DO) \
   DO(ccr::PlanarPaper)     \
   DO(ccr::PlanarRod)       \
   DO(ccr::SpatialPaper)    \

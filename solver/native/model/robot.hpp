@@ -21,8 +21,8 @@ struct Cable {
 // A dead load on the disk of a node: a force at a point of the disk, and in the plane a moment.
 struct Load {
   int node;
-  Vec<2> at;     // [mm]
-  Vec<3> force;  // in the base frame [N]
+  Vec<2> at;      // [mm]
+  Vec<3> force;   // in the base frame [N]
   double moment;  // counter-clockwise [N mm]
 };
 

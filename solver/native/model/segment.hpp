@@ -73,13 +73,13 @@ struct RodLaw {
   static constexpr bool kRod = true;
 
   struct Bend {
-    double angle;                                // θ
-    double forward, sideways;                    // chord along and across the lower disk's y axis, over its length
-    double stretch, stretch_slope;               // c'/c and c''/c of the length c of the chord
-    double cosine, sine;                         // of θ
-    double half_cosine, half_sine;               // of θ/2
+    double angle;                                   // θ
+    double forward, sideways;                       // chord along and across the lower disk's y axis, over its length
+    double stretch, stretch_slope;                  // c'/c and c''/c of the length c of the chord
+    double cosine, sine;                            // of θ
+    double half_cosine, half_sine;                  // of θ/2
     double short_by, short_slope, short_curvature;  // by how much the chord is shorter than the segment [mm]
-    double dx, dy;                               // chord in the base frame
+    double dx, dy;                                  // chord in the base frame
     static constexpr double slope = 1, curvature = 0, heading_slope = -0.5, heading_curvature = 0;
   };
 

@@ -87,8 +87,7 @@ void SpatialRod::lagrangian_hessian(System& system) const {
   for (int j = 0; j < cables_.count(); ++j)
     if (const double multiplier = cables_.multipliers()[j]; multiplier != 0)
       for (int i = 0; i < cables_[j].end; ++i)
-        for (int k = 0; k < kControl * kControl; ++k)
-          system.stages[i].huu[k] -= multiplier * taken_[j].at(4 + k, i);
+        for (int k = 0; k < kControl * kControl; ++k) system.stages[i].huu[k] -= multiplier * taken_[j].at(4 + k, i);
   system.node_hessian[robot_.segments] = {};
 }
 

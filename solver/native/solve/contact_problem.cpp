@@ -27,7 +27,8 @@ ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line});
     farthest_line_ = std::max(farthest_line_, norm(line));
   }
-  reach_ = farthest_line_ + tolerances::kReach * robot.max_length + (robot.between > 0 ? robot.max_length / robot.segments : 0);
+  reach_ = farthest_line_ + tolerances::kReach * robot.max_length +
+           (robot.between > 0 ? robot.max_length / robot.segments : 0);
 }
 
 template <class Model>
@@ -236,8 +237,7 @@ double ContactProblem<Model>::violation() const {
 
 template <class Model>
 double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) const {
-  const double scale =
-      Model::kRod ? model_.max_objective_slope + load_slope_ : model_.free_turn() * model_.free_turn();
+  const double scale = Model::kRod ? model_.max_objective_slope + load_slope_ : model_.free_turn() * model_.free_turn();
   double pressed = Model::kRod ? scale : model_.max_objective_slope;  // largest slope, of the objective or of a contact
   for (int j = 0; j < active.count; ++j)
     pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));

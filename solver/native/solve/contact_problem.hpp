@@ -151,7 +151,7 @@ class ContactProblem {
   int first_disk_contact() const { return contacts() + (Model::kRod ? static_cast<int>(robot_.rod.cables.size()) : 0); }
   bool has_loads() const { return dot(robot_.rod.weight, robot_.rod.weight) > 0 || !robot_.rod.loads.empty(); }
   bool bends_evenly() const { return model_.bends_evenly(); }  // where nothing touches
-  double lever_arm(int contact) const;  // approximate derivative of the gap in a control [mm]
+  double lever_arm(int contact) const;                         // approximate derivative of the gap in a control [mm]
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
  private:
@@ -188,7 +188,7 @@ class ContactProblem {
   Model model_;
   std::span<const Obstacle> obstacles_;
   double farthest_line_ = 0;  // distance of a line of points from the backbone
-  double reach_ = 0;  // distance of a node from an obstacle within which its points are measured
+  double reach_ = 0;          // distance of a node from an obstacle within which its points are measured
   double energy_ = 0;
   double loaded_ = 1;      // part of the loads that act
   double load_slope_ = 0;  // bound on the slope of their work in a control

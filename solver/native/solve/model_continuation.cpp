@@ -114,8 +114,7 @@ void ModelContinuation<Model>::update_trend() {
   const double travelled = travel(present_.command, trial_.command);
   clear_trend();
   const bool known = problem_.bends_evenly() && !problem_.touches_obstacle(now);
-  if (travelled == 0 || trial_.command.length != present_.command.length || known ||
-      before.count != now.count ||
+  if (travelled == 0 || trial_.command.length != present_.command.length || known || before.count != now.count ||
       !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
     return;
   const auto slope = [&](const auto& now, const auto& before, auto& slope) {
@@ -208,7 +207,8 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
 template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
   double& step = pursuit.step;
-  bool stalled = layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) && goal.length == present_.command.length;
+  bool stalled =
+      layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) && goal.length == present_.command.length;
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
   const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
   const Move move = stalled ? Move::kOverTension : try_command(next);
@@ -301,7 +301,8 @@ StepResult ModelContinuation<Model>::rest(double length, double* to) {
   evaluate_present();
   for (int k = 0; Model::kRod && k < static_cast<int>(layout_.cables.size); ++k)
     present_.command.cables[k] = std::min(0.0, problem_.taken(k));
-  for (std::size_t i = 0; i < nodes_.size(); ++i) std::copy_n(problem_.states()[i].v.begin(), kSpace, nodes_[i].v.begin());
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    std::copy_n(problem_.states()[i].v.begin(), kSpace, nodes_[i].v.begin());
   problem_.update_broadphase(nodes_, present_.mounts);
   problem_.evaluate(present_);
   points_ = problem_.points();

@@ -151,8 +151,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   std::int64_t factorizations_before_ = 0;  // of the step
   Tensions onset_{};                        // tensions where the present contact began
   bool began_in_contact_ = false;           // whether an obstacle was touched where the step began
-  Iterate before_contact_;     // the last equilibrium of the step that touched nothing,
-  Command at_contact_{};       // and a command under which the robot touches
+  Iterate before_contact_;                  // the last equilibrium of the step that touched nothing,
+  Command at_contact_{};                    // and a command under which the robot touches
   Iterate last_held_;          // the last equilibrium of the step that the motors held, where a later one was not
   bool was_exceeded_ = false;  // whether there is one
 

@@ -15,7 +15,8 @@ bool ModelContinuation<Model>::ramp_reaches_force(const Ramp& ramp, double* reac
   read_block(start.data());
   Command command{{}, ramp.length};
   for (int i = 1; i * ramp.increment < ramp.limit; ++i) {
-    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) command.cables[k] = i * ramp.increment * ramp.direction[k];
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+      command.cables[k] = i * ramp.increment * ramp.direction[k];
     factorizations_before_ = newton_.factorizations();
     if (pursue(command) != Status::kConverged) return false;
     evaluate_present();

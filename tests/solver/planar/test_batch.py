@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from solver import Circle, Robot, Scene, Solver, Status
+from solver.common.robot import MODELS
 from solver.planar.batch import BatchSolver
-from solver.planar.robot import MODELS
 
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 

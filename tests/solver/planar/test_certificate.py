@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver import Circle, ReferenceSolver, Robot, Scene, Solver, Status
+from solver.common.robot import MODELS
 from solver.planar.formulation import GAP_LAWS
-from solver.planar.robot import LINES, MODELS
+from solver.planar.robot import LINES
 
 obstacles = st.builds(
     lambda x, y, radius, spring: Circle(center=(x, y), radius=radius, spring=spring),

@@ -12,7 +12,7 @@ import pytest
 
 from solver import Custom, Ellipse, Family, ReferenceSolver, Robot, Scene, Solver, Status
 from solver.cache.compile import store
-from solver.planar.robot import MODELS
+from solver.common.robot import MODELS
 
 ELLIPSE = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
 EGG = Family.trace(lambda point, sizes: (point[0] ** 2 + point[1] ** 2 + sizes[0] * point[0]) ** 2 - sizes[1] ** 4, 2)

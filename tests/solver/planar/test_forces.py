@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from solver import Capsule, Circle, Ellipse, Equilibrium, HalfPlane, Polygon, Robot, Scene, Solver
+from solver.common.robot import MODELS
 from solver.planar.forces import VirtualWork, force_true, onset_tension
 from solver.planar.formulation import node_derivatives, robot_inequality_count
 from solver.planar.free import fitted_slopes, tip_slopes
 from solver.planar.layout import layout
-from solver.planar.robot import MODELS
 
 SCENES = [
     Scene([Circle(center=(44, 104), radius=15)]),

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver
+from solver.common.robot import MODELS
 from solver.planar.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes
-from solver.planar.robot import MODELS
 
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
-from solver.planar.robot import MODELS
+from solver.common.robot import MODELS
 
 LENGTHS = {"length_mm": 120, "length_range_mm": (60, 200)}
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS)

@@ -19,8 +19,9 @@ from solver import (
     Solver,
     sensitivity,
 )
+from solver.common.robot import MODELS
 from solver.planar.forces import force_true
-from solver.planar.robot import LINES, MODELS
+from solver.planar.robot import LINES
 
 ROBOT = Robot(
     length_mm=180, segments=18, offset_mm=8, touch=LINES, between=1, max_tension=100, length_range_mm=(170, 190)

@@ -9,7 +9,7 @@ from soak.episodes import STEPS, Episode, play
 from soak.report import Tally
 
 from solver import Capsule, Circle, Robot, Scene, Solver
-from solver.planar.robot import MODELS
+from solver.common.robot import MODELS
 
 SHORT = 3000
 ROBOT = Robot.prototype()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
+from solver.common.robot import MODELS
 from solver.planar.forces import force_true
 from solver.planar.free import free_nodes
-from solver.planar.robot import MODELS
 
 CIRCLE = Circle(center=(44, 104), radius=15)
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
