@@ -73,6 +73,7 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         self.statuses = np.zeros(self.count, np.int64)
         self.iterations = np.zeros(self.count, np.int64)
         self.factorizations = np.zeros(self.count, np.int64)
+        self._work = self.statuses, self.iterations, self.factorizations
         self._scenes: list[Scene | None] = [None] * self.count
         self.cables = len(robot.cables)
         self.commands = np.zeros((self.count, self.cables + 1))
@@ -155,8 +156,7 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         with self._exclusive:
             self._unrested.update(indices)
             self._rest(indices)
-            self.commands[indices, :-1] = self.layout.cables(self.blocks[indices])
-            self.commands[indices, -1] = self.robot.length_mm
+            self.commands[indices] = self.blocks[indices, : self.cables + 1]  # cables and length
             self._unrested.difference_update(indices)
 
     def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
@@ -171,13 +171,12 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
                 repeated, or a robot was not brought to rest in its scene; nothing has moved then.
         """
         indices = self._all if robots is None else self._check_indices(robots)
-        cables = self.cables
-        shape = (len(indices),) if cables == 1 else (len(indices), cables)
+        shape = (len(indices),) if self.cables == 1 else (len(indices), self.cables)
         commands = check_array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
         with self._exclusive:
             self._check_rested(indices)
             self._check_lengths(indices)
-            self.commands[indices, :-1] = commands.reshape(-1, cables)
+            self.commands[indices, :-1] = commands.reshape(-1, self.cables)
             self._move(indices)
 
     def move(self, robots: int | slice | list[int]) -> None:
@@ -342,11 +341,10 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         return touching_gaps(self.robot, scene, self._straight)
 
     def _rest(self, robots: list[int]) -> None:
-        work = self.statuses, self.iterations, self.factorizations
-        self._kernel_batch.rest(robots, self.robot.length_mm, self.blocks, *work)
+        self._kernel_batch.rest(robots, self.robot.length_mm, self.blocks, *self._work)
 
     def _move(self, robots: list[int]) -> None:
-        self._kernel_batch.step(robots, self.commands, self.blocks, self.statuses, self.iterations, self.factorizations)
+        self._kernel_batch.step(robots, self.commands, self.blocks, *self._work)
 
 
 BaseBatch = RobotBatch[AnyRobot, BaseEquilibrium[AnyRobot]]  # for code that serves both the plane and space

@@ -37,7 +37,11 @@ class AnyRobot(Protocol):
 
     @property
     def disk_radius_mm(self) -> float | None:
-        """Radius of the disks of a rod [mm]."""
+        """Radius of the disks of a rod as given [mm]."""
+
+    @property
+    def edge_mm(self) -> float:
+        """``disk_radius_mm`` with its default filled in [mm]."""
 
     @property
     def disk_thickness_mm(self) -> float:
@@ -169,19 +173,19 @@ def check_model(model: object) -> None:
 
 
 def check_disks(robot: AnyRobot) -> None:
-    """Fill in the radius of the disks, and check it and their thickness in proportion to the robot.
+    """Check the radius of the disks and their thickness in proportion to the robot.
 
     Raises:
         ValueError: Naming the value and the bound.
     """
-    radius = robot.offset_mm if robot.disk_radius_mm is None else robot.disk_radius_mm
     low, high = (ratio * robot.longest_mm for ratio in OFFSETS)
     bound = f"from {low:.6g} to {high:.6g}, {OFFSETS} of the longest length"
-    radius = check_number("disk_radius_mm", radius, low, high, bound)
+    if robot.disk_radius_mm is not None:
+        radius = check_number("disk_radius_mm", robot.disk_radius_mm, low, high, bound)
+        object.__setattr__(robot, "disk_radius_mm", radius)
     most = THICKEST * robot.shortest_mm / robot.segments
     bound = f"from 0 to {most:.6g}, {THICKEST} of a segment's length"
     thickness = check_number("disk_thickness_mm", robot.disk_thickness_mm, 0.0, most, bound)
-    object.__setattr__(robot, "disk_radius_mm", radius)
     object.__setattr__(robot, "disk_thickness_mm", thickness)
 
 

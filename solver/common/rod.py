@@ -100,7 +100,7 @@ class AnyRod(AnyRobot, Protocol):
 
     @property
     def cables(self) -> Sequence[Cable]:
-        """The cables, with offset and end filled in."""
+        """The cables."""
 
     @property
     def precurvature(self) -> object:
@@ -142,12 +142,12 @@ def check_rod(robot: AnyRod, space: int, usual: tuple[Cable, ...]) -> None:
         for rigidity in robot.segment_rigidity:
             check_number("an entry of segment_rigidity", rigidity, low, high, bound)
     if robot.model == "paper":
-        _check_paper(robot, filled_in(robot, usual, space))
+        _check_paper(robot, usual)
 
 
 def _check_paper(robot: AnyRod, usual: tuple[Cable, ...]) -> None:
     for name, given in (
-        ("cables", tuple(robot.cables) != usual),
+        ("cables", full_cables(robot) != tuple(_full(robot, cable) for cable in usual)),
         ("segment_rigidity", robot.segment_rigidity is not None),
         ("loads", bool(robot.loads)),
         ("weight_per_length", any(robot.weight_per_length)),
@@ -163,25 +163,24 @@ def _checked_cables(robot: AnyRod, space: int, usual: tuple[Cable, ...]) -> tupl
         raise refusal("cables", robot.cables, bound)
     for cable in cables:
         check_instance("a cable", cable, Cable, "make it by Cable(angle=…, offset_mm=…, end=…)")
-    return filled_in(robot, cables, space)  # type: ignore[arg-type]
-
-
-def filled_in(robot: AnyRod, cables: Sequence[Cable], space: int) -> tuple[Cable, ...]:
-    """Return cables with offset and end filled in.
-
-    Raises:
-        ValueError: If one does not fit the robot.
-    """
-    filled = []
-    for cable in cables:
-        offset = robot.offset_mm if cable.offset_mm is None else cable.offset_mm
+        assert isinstance(cable, Cable)
+        full = _full(robot, cable)
         low, high = OFFSETS[0] * robot.longest_mm, robot.offset_mm
-        check_number("offset_mm of a cable", offset, low, high, f"from {low:.6g} to that of the robot, {high:.6g}")
+        check_number("offset_mm of a cable", full.offset_mm, low, high, f"from {low:.6g} to the robot's, {high:.6g}")
+        check_whole("end of a cable", full.end, 1, robot.segments)
         if space == 2:
             _check_side("angle of a cable", cable.angle)
-        end = check_whole("end of a cable", robot.segments if cable.end is None else cable.end, 1, robot.segments)
-        filled.append(replace(cable, offset_mm=offset, end=end))
-    return tuple(filled)
+    return tuple(cables)  # type: ignore[arg-type]
+
+
+def _full(robot: AnyRod, cable: Cable) -> Cable:
+    offset = robot.offset_mm if cable.offset_mm is None else cable.offset_mm
+    return replace(cable, offset_mm=offset, end=robot.segments if cable.end is None else cable.end)
+
+
+def full_cables(robot: AnyRod) -> tuple[Cable, ...]:
+    """Return the cables of a robot with offset and end filled in."""
+    return tuple(_full(robot, cable) for cable in robot.cables)
 
 
 def _check_side(name: str, angle: float) -> None:
@@ -226,31 +225,32 @@ def _each_segment(robot: AnyRod, name: str, value: object) -> tuple[float, ...]:
     return tuple(check_finite(f"an entry of {name}", entry) for entry in entries)
 
 
-def checked_angles(robot: AnyRod, value: object) -> tuple[float, ...]:
-    """Return the angles of the segments at rest in the plane, given once for all or for each [rad].
+def checked_angles(robot: AnyRod, value: object) -> float | tuple[float, ...]:
+    """Return the angles of the segments at rest in the plane, one for all or one for each, as given [rad].
 
     Raises:
         ValueError: Naming the value and the bound.
     """
     angles = _each_segment(robot, "precurvature", value if is_listed(value) else [value] * robot.segments)
     _check_turns(robot, angles)
-    return angles
+    return angles if is_listed(value) else angles[0]
 
 
-def checked_rotations(robot: AnyRod, value: object) -> tuple[tuple[float, ...], ...]:
-    """Return the rotation vectors of the segments at rest in space, given once for all or for each, ``(n, 3)`` [rad].
+def checked_rotations(robot: AnyRod, value: object) -> tuple[float, ...] | tuple[tuple[float, ...], ...]:
+    """Return the rotation vectors of the segments at rest in space, one for all or one for each, as given [rad].
 
     Raises:
         ValueError: Naming the value and the bound.
     """
     bound = f"a rotation vector, or one for each of the {robot.segments} segments"
     rows = check_sequence("precurvature", value, bound)
-    rows = rows if rows and is_listed(rows[0]) else [rows] * robot.segments
+    one = not (rows and is_listed(rows[0]))
+    rows = [rows] * robot.segments if one else rows
     if len(rows) != robot.segments:
         raise refusal("precurvature", value, bound)
     vectors = tuple(check_point("an entry of precurvature", row, 3) for row in rows)
     _check_turns(robot, tuple(math.hypot(*vector) for vector in vectors))
-    return vectors
+    return vectors[0] if one else vectors
 
 
 def _check_turns(robot: AnyRod, angles: tuple[float, ...]) -> None:
@@ -265,7 +265,7 @@ def least_cable_mm(robot: AnyRod) -> float:
     return 0.0 if len(robot.cables) == 1 and not np.any(np.asarray(robot.precurvature)) else -robot.cable_limit_mm
 
 
-def check_cables(robot: AnyRobot, cables_mm: object) -> tuple[float, ...]:
+def check_cables(robot: AnyRobot, name: str, cables_mm: object) -> tuple[float, ...]:
     """Return commanded displacements of the cables as floats; of a single cable it may be a number.
 
     Raises:
@@ -274,12 +274,12 @@ def check_cables(robot: AnyRobot, cables_mm: object) -> tuple[float, ...]:
     count, low, high = len(robot.cables), robot.least_cable_mm, robot.cable_limit_mm
     bound = f"from {low:.6g} to {high:.6g} (robot.max_cable_mm)"
     if count == 1 and not is_listed(cables_mm):
-        return (check_number("cable_mm", cables_mm, low, high, bound),)
+        return (check_number(name, cables_mm, low, high, bound),)
     bound = f"{count} numbers, {bound}"
-    entries = check_sequence("cable_mm", cables_mm, bound)
+    entries = check_sequence(name, cables_mm, bound)
     if len(entries) != count:
-        raise refusal("cable_mm", cables_mm, bound)
-    return tuple(check_number("an entry of cable_mm", entry, low, high, bound) for entry in entries)
+        raise refusal(name, cables_mm, bound)
+    return tuple(check_number(f"an entry of {name}", entry, low, high, bound) for entry in entries)
 
 
 def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray) -> _kernel.Rod:
@@ -290,14 +290,14 @@ def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray) -> _kerne
         stiffness: EI, in space also GJ, of each segment over the robot's rigidity, ``(n,)`` or ``(n, 3)``.
         rest: Angles of each segment at rest, likewise [rad].
     """
-    weight = (*robot.weight_per_length, 0.0)[:3]
+    cables, weight = full_cables(robot), (*robot.weight_per_length, 0.0)[:3]
     loads = [
         _kernel.Load(node=load.node, at=load.place_mm, force=(*load.force, 0.0)[:3], moment=load.moment)
         for load in robot.loads
     ]
     return _kernel.Rod(
-        holes=[cable.hole_mm for cable in robot.cables],
-        ends=[cable.end or robot.segments for cable in robot.cables],
+        holes=[cable.hole_mm for cable in cables],
+        ends=[cable.end or robot.segments for cable in cables],
         stiffness=np.ascontiguousarray(stiffness, float),
         rest=np.ascontiguousarray(rest, float),
         weight=weight,

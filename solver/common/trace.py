@@ -35,5 +35,5 @@ def read_trace(traced: tuple[list[float], _kernel.Reason], robot: AnyRobot, scen
     numbers, reason = traced
     rows = np.reshape(numbers, (-1, int(ends[-1])))
     columns = np.split(rows, ends[:-1], axis=1)
-    nodes, points, moved = (column.reshape(-1, *part) for column, part in zip(columns, parts, strict=True))
+    nodes, points, moved = (column.reshape(len(rows), *part) for column, part in zip(columns, parts, strict=True))
     return Trace(nodes, points, moved, "" if reason is _kernel.Reason.NONE else reason.name.lower())

@@ -287,7 +287,7 @@ def _rod_segments(robot: Robot, pose: _Pose, pull: ca.MX, total: ca.MX, offset: 
 
 def _disk_gaps(robot: Robot, pose: _Pose, ahead: ca.MX) -> list[ca.MX]:
     """Return the gaps between the edges of consecutive disks, across their bisector, on each side [mm]."""
-    radius, thickness = robot.disk_radius_mm, robot.disk_thickness_mm
+    radius, thickness = robot.edge_mm, robot.disk_thickness_mm
     assert radius is not None
     half_cosine = norms(pose.disk[:, :-1] + pose.disk[:, 1:]) / (2 * robot.offset_mm)
     gaps = []

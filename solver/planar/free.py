@@ -39,7 +39,7 @@ def tip_slopes(robot: Robot, cable_mm: float, node: int | None = None) -> np.nda
         Slopes [mm, mm, rad per mm].
 
     Raises:
-        ValueError: If the displacement or the node is out of the robot's range.
+        ValueError: If the displacement or the node is out of the robot's range, or the robot does not bend evenly.
         TypeError: If the robot is not one of the plane.
     """
     angle, chord, turn, stretch = _segment(robot, cable_mm)
@@ -119,6 +119,10 @@ def clearance(robot: Robot, scene: Scene, cable_mm: float) -> float:
 def _check_cable(robot: Robot, cable_mm: float) -> float:
     """Return a cable displacement within the robot's range as a float."""
     check_instance("robot", robot, Robot, "the closed form is that of robots of the plane")
+    if not robot.bends_evenly:
+        raise ValueError(
+            "the closed form is that of a robot that one cable to its tip bends evenly; step a Solver of it"
+        )
     limit = robot.cable_limit_mm
     return check_number("cable_mm", cable_mm, 0, limit, f"from 0 to {limit:.6g} (robot.max_cable_mm)")
 
@@ -136,9 +140,9 @@ def _segment(robot: Robot, cable_mm: float) -> _Segment:
         return _Segment(float(2 * np.arcsin(pull / (2 * offset))), length, float(turn), 0.0)
     angle = pull / offset
     for _ in range(NEWTON_ITERATIONS):
-        *_, shortening, slope, _ = _arc(angle, length, offset)
-        angle -= (shortening - pull) / slope
-    _, _, _, stretch, *_, slope, _ = _arc(angle, length, offset)
+        _, taken, slope = _arc(angle, length, offset)
+        angle -= (taken - pull) / slope
+    stretch, _, slope = _arc(angle, length, offset)
     chord, turn = length * np.sinc(angle / (2 * np.pi)), 1 / (robot.segments * slope)
     return _Segment(float(angle), float(chord), float(turn), float(stretch * chord * turn))
 
@@ -148,5 +152,8 @@ def _arc_function() -> ca.Function:
     return arc_function()
 
 
-def _arc(angle: float, length: float, offset: float) -> np.ndarray:
-    return np.asarray(_arc_function()(angle, length, offset)).ravel()
+def _arc(angle: float, length: float, offset: float) -> tuple[float, float, float]:
+    """Return the relative slope of an arc's chord in the angle, and what it takes up from the cable, with its slope."""
+    law = _arc_function()(angle, length).full().ravel()
+    half_cosine, half_sine, short_by, short_slope = law[7:11]
+    return law[3], short_by + 2 * offset * half_sine, short_slope + offset * half_cosine

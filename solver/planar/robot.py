@@ -15,7 +15,7 @@ from solver.common.robot import (
     longest_arc_edge,
     widest_bend,
 )
-from solver.common.rod import Cable, Load, check_rod, checked_angles, least_cable_mm
+from solver.common.rod import Cable, Load, check_rod, checked_angles, full_cables, least_cable_mm
 from solver.common.validation import check_number, check_positive, check_sequence, refusal
 
 LINES = ("backbone", "cable", "rim")
@@ -172,9 +172,14 @@ class Robot:
         return self.length_mm / self.segments
 
     @property
+    def edge_mm(self) -> float:
+        """``disk_radius_mm`` with its default filled in [mm]."""
+        return self.offset_mm if self.disk_radius_mm is None else self.disk_radius_mm
+
+    @property
     def lines_mm(self) -> tuple[float, ...]:
         """Distances of the lines of ``touch`` from the backbone, towards the cable [mm]."""
-        cables = dict.fromkeys(math.copysign(cable.offset_mm or 0.0, cable.hole_mm[0]) for cable in self.cables)
+        cables = dict.fromkeys(math.copysign(cable.offset_mm or 0.0, cable.hole_mm[0]) for cable in full_cables(self))
         distances = {"backbone": (0.0,), "cable": tuple(cables), "rim": (-self.offset_mm,)}
         return tuple(dict.fromkeys(distance for line in self.touch for distance in distances[line]))
 
@@ -198,6 +203,13 @@ class Robot:
         return self.rigidity / (2 * self.segment_mm)
 
     @property
+    def bends_evenly(self) -> bool:
+        """Whether all segments of the robot that nothing touches bend alike: one cable to the tip alone bends it."""
+        loaded = self.loads or any(self.weight_per_length) or self.segment_rigidity
+        one = full_cables(self) == (Cable(offset_mm=self.offset_mm, end=self.segments),)
+        return one and not loaded and self.least_cable_mm == 0
+
+    @property
     def least_cable_mm(self) -> float:
         """Least displacement of a cable: 0 for one alone on a robot that is straight at rest [mm]."""
         return least_cable_mm(self)
@@ -213,8 +225,7 @@ class Robot:
 def _longest_edges(robot: Robot) -> tuple[float, ...]:
     segment = robot.longest_mm / robot.segments
     if robot.model == "rod":
-        assert robot.disk_radius_mm is not None
-        widest = widest_bend(segment, robot.disk_radius_mm, robot.disk_thickness_mm)
+        widest = widest_bend(segment, robot.edge_mm, robot.disk_thickness_mm)
         longest = [longest_arc_edge(segment, line, widest) for line in robot.lines_mm]
     else:
         turned = math.sqrt(segment**2 - (segment - robot.cable_limit_mm / robot.segments) ** 2) / robot.offset_mm

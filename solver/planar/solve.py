@@ -34,7 +34,7 @@ class CommandCheck:
         if type(cable_mm) is float and 0 < cable_mm <= self.robot.cable_limit_mm and len(self.robot.cables) == 1:
             cables: tuple[float, ...] = (cable_mm,)
         else:
-            cables = check_cables(self.robot, cable_mm)
+            cables = check_cables(self.robot, "cable_mm", cable_mm)
         check_origin(self.robot, self.scene, equilibrium, Equilibrium)
         return *cables, equilibrium.length_mm if length_mm is None else self.robot.check_length(length_mm)
 
@@ -95,8 +95,8 @@ class Solver(CommandCheck):
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one of the plane.
         """
-        reached = np.empty_like(equilibrium.block)
         command = self.check_command(equilibrium, cable_mm, length_mm)
+        reached = np.empty_like(equilibrium.block)
         work = self._kernel.step(equilibrium.block, command, reached)
         return Equilibrium.solved(self.robot, self.scene, reached, *work)
 
@@ -133,7 +133,7 @@ def kernel_robot(robot: Robot) -> _kernel.Robot:
         rigidity=robot.rigidity,
         max_tension=robot.max_tension,
         max_length=robot.lengths_mm[1],
-        disk_radius=robot.disk_radius_mm or robot.offset_mm,
+        disk_radius=robot.edge_mm,
         disk_thickness=robot.disk_thickness_mm,
         lines=[(line, 0.0) for line in robot.lines_mm],
         edges=list(robot.edges_mm),
@@ -146,7 +146,7 @@ def _kernel_rod(robot: Robot) -> _kernel.Rod:
     stiffness = np.ones(robot.segments)
     if robot.segment_rigidity is not None:
         stiffness = np.array(robot.segment_rigidity) / robot.rigidity
-    return kernel_rod(robot, stiffness, np.array(robot.precurvature))
+    return kernel_rod(robot, stiffness, np.broadcast_to(robot.precurvature, robot.segments))
 
 
 def kernel_scene(robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:

@@ -16,8 +16,8 @@ from solver.common.robot import (
     longest_arc_edge,
     widest_bend,
 )
-from solver.common.rod import Cable, Load, check_rod, checked_rotations
-from solver.common.validation import check_finite, check_number, check_whole, is_listed, refusal
+from solver.common.rod import Cable, Load, check_rod, checked_rotations, full_cables
+from solver.common.validation import check_finite, check_number, check_sequence, check_whole, is_listed, refusal
 
 LINES = ("backbone", "holes", "rim")
 TORSIONS = (0.01, 100.0)  # GJ over EI
@@ -110,11 +110,12 @@ class SpatialRobot:
         check_rod(self, 3, paper)
         assign(self, "precurvature", checked_rotations(self, self.precurvature))
         given = self.torsion_ratio
-        ratios = list(given) if is_listed(given) else [given] * self.segments
+        ratios = check_sequence("torsion_ratio", given, "numbers") if is_listed(given) else [given] * self.segments
         bound = f"from {TORSIONS[0]} to {TORSIONS[1]}, one number or one for each of the {self.segments} segments"
         if len(ratios) != self.segments:
             raise refusal("torsion_ratio", self.torsion_ratio, bound)
-        assign(self, "torsion_ratio", tuple(check_number("torsion_ratio", ratio, *TORSIONS, bound) for ratio in ratios))
+        checked = tuple(check_number("torsion_ratio", ratio, *TORSIONS, bound) for ratio in ratios)
+        assign(self, "torsion_ratio", checked if is_listed(given) else checked[0])
 
     def _check_cable_limit(self) -> None:
         check_cable_limit(self, min(math.pi * self.offset_mm, self.length_mm) / (2 if self.model == "paper" else 1))
@@ -158,7 +159,12 @@ class SpatialRobot:
         if self.model == "paper":
             first, second = self.holes[:, :2]
             return np.array([first, second, -first, -second])
-        return np.array(list(dict.fromkeys(cable.hole_mm for cable in self.cables)))
+        return np.array(list(dict.fromkeys(cable.hole_mm for cable in full_cables(self))))
+
+    @property
+    def edge_mm(self) -> float:
+        """``disk_radius_mm`` with its default filled in [mm]."""
+        return self.offset_mm if self.disk_radius_mm is None else self.disk_radius_mm
 
     @property
     def lines_mm(self) -> np.ndarray:
@@ -215,9 +221,8 @@ class SpatialRobot:
         bends and twists at most up to where its disks meet.
         """
         if self.model == "rod":
-            assert self.disk_radius_mm is not None
             reaches = np.linalg.norm(self.lines_mm, axis=1)
-            widest = widest_bend(self.segment_mm, self.disk_radius_mm, self.disk_thickness_mm)
+            widest = widest_bend(self.segment_mm, self.edge_mm, self.disk_thickness_mm)
             return tuple(longest_arc_edge(self.segment_mm, reach, widest) / (self.between + 1) for reach in reaches)
         segment, shared = self.segment_mm, self.cable_limit_mm / self.segments
         turned = math.sqrt(segment**2 - (segment - shared) ** 2)

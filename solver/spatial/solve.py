@@ -31,7 +31,7 @@ class SpatialCommandCheck:
             ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one in space.
         """
-        cables = check_cables(self.robot, cables_mm)
+        cables = check_cables(self.robot, "cables_mm", cables_mm)
         check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
         return cables
 
@@ -87,8 +87,8 @@ class SpatialSolver(SpatialCommandCheck):
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one in space.
         """
-        reached = np.empty_like(equilibrium.block)
         command = (*self.check_command(equilibrium, cables_mm), self.robot.length_mm)
+        reached = np.empty_like(equilibrium.block)
         work = self._kernel.step(equilibrium.block, command, reached)
         return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
 
@@ -122,7 +122,7 @@ def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
         rigidity=robot.rigidity,
         max_tension=robot.max_tension,
         max_length=robot.length_mm,
-        disk_radius=robot.disk_radius_mm or robot.offset_mm,
+        disk_radius=robot.edge_mm,
         disk_thickness=robot.disk_thickness_mm,
         lines=robot.lines_mm.tolist(),
         edges=list(robot.edges_mm),
@@ -136,7 +136,7 @@ def _kernel_rod(robot: SpatialRobot) -> _kernel.Rod:
     if robot.segment_rigidity is not None:
         bending = np.array(robot.segment_rigidity) / robot.rigidity
     stiffness = np.column_stack([bending, bending, bending * np.array(robot.torsion_ratio)])
-    return kernel_rod(robot, stiffness, np.array(robot.precurvature))
+    return kernel_rod(robot, stiffness, np.broadcast_to(robot.precurvature, (robot.segments, 3)))
 
 
 def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:

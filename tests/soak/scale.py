@@ -35,7 +35,7 @@ def scale_robot(robot, s):
         "max_cable_mm": s * robot.max_cable_mm,
     }
     if isinstance(robot, Robot):
-        disks = {"disk_radius_mm": s * robot.disk_radius_mm, "disk_thickness_mm": s * robot.disk_thickness_mm}
+        disks = {"disk_radius_mm": s * robot.edge_mm, "disk_thickness_mm": s * robot.disk_thickness_mm}
         lengths |= disks | {"length_range_mm": times(robot.length_range_mm, s)}
     return replace(robot, rigidity=s * s * robot.rigidity, **lengths)
 

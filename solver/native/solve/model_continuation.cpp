@@ -241,76 +241,6 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   return true;
 }
 
-// Before the robot first touches: keeps its last shape, from which the onset of the contact is found.
-template <class Model>
-void ModelContinuation<Model>::keep_before_contact(const Iterate& next) {
-  if (problem_.bends_evenly() || problem_.touches_obstacle(present_.active)) return;
-  if (!problem_.touches_obstacle(next.active)) return;
-  before_contact_ = present_;
-  at_contact_ = next.command;
-}
-
-// Leaves in `trial_` the robot under a command part of the way to where it touches; false where it touches.
-template <class Model>
-bool ModelContinuation<Model>::is_clear_at(const Command& start, double part) {
-  if (problem_.bends_evenly()) {
-    trial_.command = between(start, present_.command, part);
-    problem_.set_free_shape(trial_);
-    return problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
-  }
-  trial_ = before_contact_;
-  trial_.command = between(before_contact_.command, at_contact_, part);
-  if (newton_.solve(trial_, 0).converged && !problem_.touches_obstacle(trial_.active)) return true;
-  trial_ = before_contact_;
-  problem_.evaluate(trial_);
-  return false;
-}
-
-// Tensions of the free robot where it first touches, found by bisection, each with the sign of its displacement.
-template <class Model>
-ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command& start) {
-  const auto clear = [&](double part) { return is_clear_at(start, part); };
-  double low = 0, high = 1;
-  if (!clear(high))
-    for (int i = 0; i < kOnsetBisections; ++i) {
-      const double middle = (low + high) / 2;
-      (clear(middle) ? low : high) = middle;
-    }
-  clear(problem_.bends_evenly() ? high : low);
-  problem_.reduced_gradient(trial_.active);
-  Tensions tensions = problem_.tensions(trial_.active);
-  if (!Model::kRod)
-    for (int k = 0; k < kCables; ++k)
-      if (trial_.command.cables[k] < 0) tensions[k] = -tensions[k];
-  return tensions;
-}
-
-template <class Model>
-StepResult ModelContinuation<Model>::rest(double length, double* to) {
-  const Robot& robot = problem_.robot();
-  result_ = {};
-  factorizations_before_ = newton_.factorizations();
-  was_exceeded_ = began_in_contact_ = present_evaluated_ = false;
-  present_.command = {{}, length, problem_.has_loads() ? 0.0 : 1.0};
-  present_.active.count = 0;
-  for (int i = 0; i < robot.segments; ++i)
-    for (int k = 0; k < Model::kControl; ++k)
-      present_.controls[i][k] = Model::kRod ? robot.rod.rest[i * Model::kControl + k] : 0.0;
-  std::fill(present_.mounts.begin(), present_.mounts.end(), Position{});
-  clear_trend();
-  evaluate_present();
-  for (int k = 0; Model::kRod && k < static_cast<int>(layout_.cables.size); ++k)
-    present_.command.cables[k] = std::min(0.0, problem_.taken(k));
-  for (std::size_t i = 0; i < nodes_.size(); ++i)
-    std::copy_n(problem_.states()[i].v.begin(), kSpace, nodes_[i].v.begin());
-  problem_.update_broadphase(nodes_, present_.mounts);
-  problem_.evaluate(present_);
-  points_ = problem_.points();
-  mounts_ = present_.mounts;
-  result_.status = problem_.violation() > 0 ? Status::kGaveUp : pursue({present_.command.cables, length});
-  return finish(present_.command, to);
-}
-
 template <class Model>
 StepResult ModelContinuation<Model>::follow(const double* from, const double* target, double* to) {
   result_ = {};
@@ -392,11 +322,11 @@ Optimality ModelContinuation<Model>::optimality(const double* block) {
   template Status ModelContinuation<Model>::pursue(const Command&);                            \
   template StepResult ModelContinuation<Model>::follow(const double*, const double*, double*); \
   template void ModelContinuation<Model>::evaluate_present();                                  \
+  template StepResult ModelContinuation<Model>::finish(const Command&, double*);               \
   template void ModelContinuation<Model>::accept();                                            \
   template void ModelContinuation<Model>::record_shape();                                      \
   template void ModelContinuation<Model>::clear_trend();                                       \
   template void ModelContinuation<Model>::extrapolate_trial();                                 \
-  template StepResult ModelContinuation<Model>::rest(double, double*);                         \
   template double ModelContinuation<Model>::pull(const Command&, int) const;                   \
   template bool ModelContinuation<Model>::pulls_cable(const Command&) const;                   \
   template bool ModelContinuation<Model>::only_releases(const Command&) const;                 \

@@ -263,7 +263,7 @@ def test_robots_whose_rest_was_cut_short_do_not_move_until_they_rest(monkeypatch
     batch = crowd(3, 18)
     batch.step(np.full(3, 9.0))
     with monkeypatch.context() as patch:
-        patch.setattr(batch, "_move", interrupted)
+        patch.setattr(batch, "_rest", interrupted)
         with pytest.raises(KeyboardInterrupt):
             batch.rest([1])
     for use in (lambda: batch.move(1), lambda: batch.equilibrium(1), lambda: batch.step(np.full(3, 9.5))):

@@ -70,7 +70,7 @@ def test_what_a_solver_is_made_of(solver):
 
 
 @pytest.mark.parametrize("step", ["step", "trace"])
-@pytest.mark.parametrize("cable", [-0.1, 25.2, math.nan, math.inf, None, "3", True, 3j, [3.0], np.array(3.0), 10**400])
+@pytest.mark.parametrize("cable", [-0.1, 25.2, math.nan, math.inf, None, "3", True, 3j, np.array(3.0), 10**400])
 def test_command(cable, step):
     solver = Solver(Robot.prototype(), Scene())
     pulled = solver.step(solver.rest(), 3.0)

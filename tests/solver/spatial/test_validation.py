@@ -113,7 +113,7 @@ def test_shape(build, message):
 def test_command(robot, cables, pulled):
     solver = SpatialSolver(robot, SCENE)
     for call in (solver.step, solver.trace):
-        with pytest.raises(ValueError, match=r"cables_mm is .*; it must be a pair, both within ±12.5664"):
+        with pytest.raises(ValueError, match=r"cables_mm is .*; it must be 2 numbers, from -12.5664 to 12.5664"):
             call(pulled, cables)
         with pytest.raises(TypeError, match="equilibrium is None; it must be a SpatialEquilibrium: step from rest"):
             call(None, (1.0, 1.0))

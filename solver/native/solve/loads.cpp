@@ -1,0 +1,68 @@
+// The loads of a rod: gravity, and dead forces and moments on its disks.
+#include <cmath>
+
+#include "model/models.hpp"
+#include "solve/contact_problem.hpp"
+
+namespace ccr {
+
+// Calls `each` with node, lever, force and moment of every load: gravity as the weight of each segment, half and half
+// at its nodes, then the dead loads.
+template <class Model>
+template <class Each>
+void ContactProblem<Model>::each_load(Each each) const {
+  const Rod& rod = robot_.rod;
+  const double scale = loaded_ / energy_scale();
+  const auto scaled = [&](const Vec<3>& force, double by) {
+    Position out;
+    for (int k = 0; k < kSpace; ++k) out[k] = scale * by * force[k];
+    return out;
+  };
+  const int n = robot_.segments;
+  if (dot(rod.weight, rod.weight) > 0)
+    for (int i = 1; i <= n; ++i)
+      each(i, Position{}, scaled(rod.weight, model_.segment_length() * (i < n ? 1 : 0.5)), 0.0);
+  for (const Load& load : rod.loads)
+    each(load.node, Model::lever(frames()[load.node], load.at), scaled(load.force, 1), scale * load.moment);
+}
+
+template <class Model>
+double ContactProblem<Model>::load_work() {
+  double work = 0, pressed = 0;
+  each_load([&](int node, const Position& lever, const Position& force, double moment) {
+    for (int k = 0; k < kSpace; ++k) work += force[k] * (states()[node][k] + lever[k]);
+    if constexpr (Model::kTurn == 1) work += moment * states()[node][2];
+    pressed += norm(force) * robot_.max_length + std::abs(moment);
+  });
+  load_slope_ = pressed;
+  return work;
+}
+
+template <class Model>
+void ContactProblem<Model>::add_loads(std::vector<State>& node_forces) const {
+  each_load([&](int node, const Position& lever, const Position& force, double moment) {
+    const auto turning = ccr::moment(lever, force);
+    for (int k = 0; k < kSpace; ++k) node_forces[node][k] += force[k];
+    for (int k = 0; k < Model::kTurn; ++k) node_forces[node][kSpace + k] += turning[k];
+    if constexpr (Model::kTurn == 1) node_forces[node][2] += moment;
+  });
+}
+
+template <class Model>
+void ContactProblem<Model>::add_load_curvature(System& system) const {
+  each_load([&](int node, const Position& lever, const Position& force, double) {
+    const auto turn = hessian_contraction(lever, force);
+    for (int r = 0; r < Model::kTurn; ++r)
+      for (int c = 0; c < Model::kTurn; ++c) system.node_hessian[node](kSpace + r, kSpace + c) -= turn(r, c);
+  });
+}
+
+#define CCR_INSTANTIATE(Model)                                                      \
+  template double ContactProblem<Model>::load_work();                               \
+  template void ContactProblem<Model>::add_loads(std::vector<Model::State>&) const; \
+  template void ContactProblem<Model>::add_load_curvature(Model::System&) const;
+CCR_INSTANTIATE(PlanarRod)
+CCR_INSTANTIATE(SpatialRod)
+#undef CCR_INSTANTIATE
+
+}  // namespace ccr
