@@ -43,9 +43,7 @@ def read_states(recorded):
 @pytest.mark.parametrize("name", RECORDED)
 def test_states_are_those_recorded(name):
     recorded = RECORDED[name]
-    spec = recorded["spec"]
-    if reason := robots.missing(spec):
-        pytest.skip(reason)
+    spec = robots.require(recorded["spec"])
     length, offset, rigidity = sum(spec["segment_mm"]), spec["cables"][0]["offset"], np.mean(spec["EI"])
     for state, equilibrium in read_states(recorded):
         found, frames = robots.read(equilibrium), state["rotations"] if spec["space"] else state["phi"]

@@ -11,6 +11,7 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
 
 import solver
 from solver import spatial
@@ -26,6 +27,27 @@ class Reading(NamedTuple):
     frames: np.ndarray
     tensions: np.ndarray
     forces: np.ndarray
+
+
+def plane(n: int, **changes: Any) -> dict[str, Any]:
+    """Return the description of the paper's prototype in n segments, free, with one cable, or with changes."""
+    return {
+        "space": False,
+        "n": n,
+        "segment_mm": [180.0 / n] * n,
+        "EI": [5000.0] * n,
+        "cables": [{"offset": 8.0, "angle": 0.0, "end": n}],
+        "touch": [{"offset": 0.0, "angle": 0.0}, {"offset": 8.0, "angle": 0.0}],
+        "obstacles": [],
+        **changes,
+    }
+
+
+def require(spec: Spec) -> Spec:
+    """Return a description that the package can build; skip the test if it cannot."""
+    if reason := missing(spec):
+        pytest.skip(reason)
+    return spec
 
 
 def missing(spec: Spec) -> str:
