@@ -1,16 +1,19 @@
 """Planar elastica under frictionless cables, dead loads and point contacts, by shooting.
 
-Backbone r(s), 0 ≤ s ≤ L, with tangent t = (sin θ, cos θ) and normal d = (cos θ, −sin θ), where θ = −φ of the package: clamped at the
-origin, pointing along +y at rest, the cables' side d = +x. A cable at the distance a from the backbone runs along r + a d, so that its
-length up to s is s − a θ(s): the bending that a pull shortens. A cable without friction has the same tension T all along.
+Backbone r(s), 0 ≤ s ≤ L, with tangent t = (sin θ, cos θ) and normal d = (cos θ, −sin θ), where θ = −φ of the
+package: it is clamped at the origin, points along +y at rest, and d is then +x. A cable at the distance a runs
+along r + a d, so that its length up to s is s − a θ(s), shortened by bending. Without friction its tension T is
+the same all along.
 
-The equilibrium minimises ∫ EI θ'²/2 ds less the work of the loads under a θ(s_e) = pull for every cable, of multiplier T, and under zero
-gap at every contact, of multiplier N. With M = EI θ' and p(s) the sum of all outer forces beyond s, it obeys
+The equilibrium minimises ∫ EI θ'²/2 ds less the work of the loads, under a θ(s_e) = pull for every cable, with
+multiplier T, and under zero gap at every contact, with multiplier N. With M = EI θ' and p(s) the sum of all outer
+forces beyond s, it obeys
 
-    r' = t,   θ' = M / EI,   M' = −p · d,   M(L) = 0,
+    r' = t,   θ' = M / EI,   M' = −p · d,   M(L) = 0.
 
-and M drops along +s by T a at the end of a cable, and by −b F · t at a force F on the line r + b d, since ∂(b d)/∂θ = −b t. Nothing else of
-the cable shows: its pressure T κ on the backbone and its pull T at the end balance in every section that is cut through both.
+Along +s, M drops by T a at the end of a cable, and by −b F · t at a force F on the line r + b d, since ∂(b d)/∂θ
+= −b t. Nothing else of the cable shows: its pressure T κ on the backbone and its pull T at the end balance in
+every section.
 """
 
 from collections.abc import Callable
@@ -66,7 +69,7 @@ class Beam:
 
 @dataclass(frozen=True)
 class Solution:
-    """Tensions (c,) [N], contact forces on the beam (m, 2) [N], arc lengths of the contacts (m,) [mm], and the shape."""
+    """Tensions (c,) [N], contact forces on the beam (m, 2) [N], their arc lengths (m,) [mm], and the shape."""
 
     tensions: np.ndarray
     forces: np.ndarray

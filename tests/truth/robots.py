@@ -1,8 +1,8 @@
 """The package's robots from plain descriptions: the one place of these tests that knows its constructors.
 
-A description is a mapping as in tests/data/rod (README there); an obstacle may also name the ``nodes`` that can touch it.
-:func:`missing` names what the package cannot build, from the fields of its robots, so that a test skipped for it runs by
-itself once the field exists.
+A description is a mapping as in tests/data/rod (README there), where an obstacle may also name the ``nodes`` that can
+touch it. :func:`missing` names what the package cannot build, from the fields of its robots, so that a test skipped for
+it runs by itself once the field exists.
 """
 
 import math

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.special import ellipkinc
+
 from truth.elastica import Beam, Cable, Contact, Load, circle, solve, wall
 
 LENGTH, OFFSET, RIGIDITY = 180.0, 8.0, 5000.0
@@ -76,7 +77,7 @@ def panels_of(beam, found):
 def potential(beam, found, angle, slope):
     """Return the energy less all work, at θ plus a trial angle(s), whose derivative is slope(s).
 
-    Tensions and contact forces are those found: at an equilibrium they are the multipliers of what cables and contacts ask.
+    Tensions and contact forces are those found, the multipliers of cables and contacts at an equilibrium.
     """
     s, weights = panels_of(beam, found)
     theta = angle(s) - np.reshape(found.poses(s.ravel())[:, 2], s.shape)
