@@ -1,8 +1,8 @@
 """Kirchhoff rod in space with frictionless cables, dead loads and spheres, minimised by IPOPT.
 
-Backbone r(s) and frame R(s) obey r' = R e₃ and R' = R û, where the body curvature u = (u_x, u_y, u_z) has the energy
-∫ (EI (u_x² + u_y²) + GJ u_z²)/2 ds, each less its precurvature. A cable runs along r + R h, h = a (cos α, sin α, 0), so that its length is
-∫ |e₃ + u × h| ds; it is at most the rest length less the pull, and the multiplier is its tension.
+Backbone r(s) and frame R(s) obey r' = R e₃ and R' = R û, where the body curvature u = (u_x, u_y, u_z), less that at
+rest, has the energy ∫ (EI (u_x² + u_y²) + GJ u_z²)/2 ds. A cable runs along r + R h, h = a (cos α, sin α, 0), so that
+its length is ∫ |e₃ + u × h| ds; it is at most the rest length less the pull, and the multiplier is its tension.
 
 The curvature is linear on each of m elements and jumps between them; frames are quaternions, integrated by Runge and
 Kutta's method, and are unknowns at the ends of elements. Cable lengths and weight are integrated along. What is found
@@ -10,7 +10,7 @@ converges as m⁻⁴. Points of disks can touch at given ``stations`` alone, as 
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -37,6 +37,56 @@ OPTIONS = {
         "mu_init": 1e-5,
     },
 }
+
+
+def _hole(offset: float, angle: float) -> np.ndarray:
+    return offset * np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def _rotation(q: ca.SX) -> ca.SX:
+    """Return the rotation of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    return ca.vertcat(
+        ca.horzcat(1 - 2 * (y**2 + z**2), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        ca.horzcat(2 * (x * y + w * z), 1 - 2 * (x**2 + z**2), 2 * (y * z - w * x)),
+        ca.horzcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x**2 + y**2)),
+    )
+
+
+def _slope(state: ca.SX, u: ca.SX) -> ca.SX:
+    """Return the derivative of (r, q) along the rod."""
+    q = state[3:]
+    w, v = q[0], q[1:]
+    turned = ca.vertcat(-ca.dot(v, u), w * u + ca.cross(v, u)) / 2
+    return ca.vertcat(_rotation(q)[:, 2], turned)
+
+
+def _runge_kutta(state: ca.SX, curvature: ca.Function, start: float, share: float, size: float) -> ca.SX:
+    """Return the state after a step of a share of an element of some size."""
+    step = share * size
+    first = _slope(state, curvature(start))
+    second = _slope(state + step / 2 * first, curvature(start + share / 2))
+    third = _slope(state + step / 2 * second, curvature(start + share / 2))
+    fourth = _slope(state + step * third, curvature(start + share))
+    return state + step / 6 * (first + 2 * second + 2 * third + fourth)
+
+
+def element(size: float, holes: list[np.ndarray]) -> ca.Function:
+    """Return (r, q) at the end of an element, its share of the integral of r, and how much each cable is shortened."""
+    state, mean, tilt = ca.SX.sym("state", 7), ca.SX.sym("mean", 3), ca.SX.sym("tilt", 3)
+
+    def curvature(share: float) -> ca.SX:
+        return mean + (2 * share - 1) * tilt
+
+    middle = _runge_kutta(state, curvature, 0.0, 0.5, size)
+    end = _runge_kutta(middle, curvature, 0.5, 0.5, size)
+    centre = size / 6 * (state[:3] + 4 * middle[:3] + end[:3])
+    end = ca.vertcat(end[:3], end[3:] / ca.norm_2(end[3:]))
+    shortened = []
+    for hole in holes:
+        lines = [ca.DM([0, 0, 1]) + ca.cross(curvature((1 + point) / 2), ca.DM(hole)) for point in POINTS]
+        shortened.append(size * (1 - sum(w / 2 * ca.norm_2(x) for w, x in zip(WEIGHTS, lines, strict=True))))
+    return ca.Function("element", [state, mean, tilt], [end, centre, ca.vertcat(*shortened)])
 
 
 class Cable(NamedTuple):
@@ -72,8 +122,9 @@ class State(NamedTuple):
 class Rod:
     """A rod and what acts on it.
 
-    ``touch`` are (offset, angle) of points of the disks at evenly spaced ``stations``, the base not counted; ``spheres``
-    are (centre, radius). ``weight`` is a force on a unit of length [N/mm], ``precurvature`` the curvature at rest [1/mm].
+    ``touch`` are (offset, angle) of points of the disks at evenly spaced ``stations``, the base not counted;
+    ``spheres`` are (centre, radius). ``weight`` is a force on a unit of length [N/mm], ``precurvature`` the curvature
+    at rest [1/mm]. ``law`` replaces the elements by others, such as :func:`truth.segments.segment`.
     """
 
     length: float
@@ -87,6 +138,7 @@ class Rod:
     loads: tuple[Load, ...] = ()
     weight: tuple[float, float, float] = (0.0, 0.0, 0.0)
     precurvature: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    law: Callable[[float, list[np.ndarray]], ca.Function] = element
 
     def follow(self, pulls: Iterable[Iterable[float]]) -> State:
         """Return the state after a path of pulls, each solved from the one before, from the straight rod on.
@@ -145,58 +197,6 @@ class _Problem(NamedTuple):
     upper: np.ndarray
 
 
-def _hole(offset: float, angle: float) -> np.ndarray:
-    return offset * np.array([math.cos(angle), math.sin(angle), 0.0])
-
-
-def _rotation(q: ca.SX) -> ca.SX:
-    """Return the rotation of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    return ca.vertcat(
-        ca.horzcat(1 - 2 * (y**2 + z**2), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        ca.horzcat(2 * (x * y + w * z), 1 - 2 * (x**2 + z**2), 2 * (y * z - w * x)),
-        ca.horzcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x**2 + y**2)),
-    )
-
-
-def _slope(state: ca.SX, u: ca.SX) -> ca.SX:
-    """Return the derivative of (r, q) along the rod."""
-    q = state[3:]
-    w, v = q[0], q[1:]
-    turned = ca.vertcat(-ca.dot(v, u), w * u + ca.cross(v, u)) / 2
-    return ca.vertcat(_rotation(q)[:, 2], turned)
-
-
-def _runge_kutta(state: ca.SX, curvature: ca.Function, start: float, share: float, size: float) -> ca.SX:
-    """Return the state after a step of a share of an element of some size."""
-    step = share * size
-    first = _slope(state, curvature(start))
-    second = _slope(state + step / 2 * first, curvature(start + share / 2))
-    third = _slope(state + step / 2 * second, curvature(start + share / 2))
-    fourth = _slope(state + step * third, curvature(start + share))
-    return state + step / 6 * (first + 2 * second + 2 * third + fourth)
-
-
-def _element(rod: Rod) -> ca.Function:
-    """Return (r, q) at the end of an element, the integral of r, and how much each cable is shortened there."""
-    state, mean, tilt = ca.SX.sym("state", 7), ca.SX.sym("mean", 3), ca.SX.sym("tilt", 3)
-    size = 1 / rod.elements
-
-    def curvature(share: float) -> ca.SX:
-        return mean + (2 * share - 1) * tilt
-
-    middle = _runge_kutta(state, curvature, 0.0, 0.5, size)
-    end = _runge_kutta(middle, curvature, 0.5, 0.5, size)
-    centre = size / 6 * (state[:3] + 4 * middle[:3] + end[:3])
-    end = ca.vertcat(end[:3], end[3:] / ca.norm_2(end[3:]))
-    shortened = []
-    for cable in rod.cables:
-        hole = ca.DM(_hole(cable.offset, cable.angle) / rod.length)
-        lines = [ca.DM([0, 0, 1]) + ca.cross(curvature((1 + point) / 2), hole) for point in POINTS]
-        shortened.append(size * (1 - sum(w / 2 * ca.norm_2(x) for w, x in zip(WEIGHTS, lines, strict=True))))
-    return ca.Function("element", [state, mean, tilt], [end, centre, ca.vertcat(*shortened)])
-
-
 def _chain(rod: Rod, unknowns: ca.MX) -> tuple:
     """Split unknowns into mean and tilt of curvatures (6, m), and places (3, m+1) and quaternions (4, m+1)."""
     table = ca.reshape(unknowns, 13, rod.elements)
@@ -209,7 +209,10 @@ def _problem(rod: Rod) -> _Problem:
     unknowns, pulls = ca.MX.sym("x", 13 * rod.elements), ca.MX.sym("pull", len(rod.cables))
     curvatures, places, turns = _chain(rod, unknowns)
     states = ca.vertcat(places, turns)
-    ends, centres, shortened = _element(rod).map(rod.elements)(states[:, :-1], curvatures[:3, :], curvatures[3:, :])
+    law = (rod.law or element)(
+        1 / rod.elements, [_hole(cable.offset, cable.angle) / rod.length for cable in rod.cables]
+    )
+    ends, centres, shortened = law.map(rod.elements)(states[:, :-1], curvatures[:3, :], curvatures[3:, :])
     unequal = [ca.vec(states[:, 1:] - ends)]
     taut = []
     for k, cable in enumerate(rod.cables):

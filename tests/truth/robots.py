@@ -43,6 +43,17 @@ def plane(n: int, **changes: Any) -> dict[str, Any]:
     }
 
 
+def space(n: int, *angles: float, torsion_ratio: float = 0.75, **changes: Any) -> dict[str, Any]:
+    """Return the description of a prototype in space in n segments, free, with cables at angles, or with changes.
+
+    Backbone and four points of the edge can touch.
+    """
+    cables = [{"offset": 8.0, "angle": angle, "end": n} for angle in angles]
+    edge = [{"offset": 8.0, "angle": k * math.pi / 2} for k in range(4)]
+    spatial_robot = {"space": True, "GJ": [5000.0 * torsion_ratio] * n, "cables": cables}
+    return plane(n, **{**spatial_robot, "touch": [{"offset": 0.0, "angle": 0.0}, *edge], **changes})
+
+
 def require(spec: Spec) -> Spec:
     """Return a description that the package can build; skip the test if it cannot."""
     if reason := missing(spec):
@@ -95,10 +106,15 @@ def read(equilibrium: Any) -> Reading:
     return Reading(nodes[:, :2], nodes[:, 2], np.asarray(tensions), equilibrium.forces)
 
 
+def normal_forces(equilibrium: Any) -> np.ndarray:
+    """Return the normal force of every point that can touch, (obstacles, points, positions) [N]."""
+    return np.asarray(equilibrium.energy_scale * equilibrium.multipliers)
+
+
 def _has_default_cable(spec: Spec) -> bool:
     """Whether the one cable of a robot is that of the plane's default: at angle 0, up to the tip."""
-    (cable, *others), end = spec["cables"], spec["n"]
-    return not spec["space"] and not others and cable["angle"] == 0 and cable["end"] == end
+    cables = spec["cables"]
+    return not spec["space"] and [(cable["angle"], cable["end"]) for cable in cables] == [(0, spec["n"])]
 
 
 def _needs(spec: Spec) -> set[str]:

@@ -1,13 +1,18 @@
 """The rod in space against closed forms, the planar elastica, and the numbers of another program."""
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+
 from truth import elastica
 from truth.kirchhoff import Cable, Load, Rod
+from truth.segments import segment
 
+DATA = Path(__file__).parents[1] / "data" / "rod"
 LENGTH, OFFSET, RIGIDITY, RATIO = 180.0, 8.0, 5000.0, 0.75
 FOUR = ((0.0, 0.0), *((OFFSET, k * math.pi / 2) for k in range(4)))
 SPHERE = ((40.0, 6.0, 104.0), 15.0)
@@ -119,3 +124,25 @@ def test_in_its_plane_it_is_the_elastica():
     assert found.forces[0, ::2] == pytest.approx(exact.forces[0], abs=1e-6)
     assert found.places[:, ::2] == pytest.approx(exact.poses(np.linspace(0, LENGTH, 37))[:, :2], abs=1e-5)
     assert found.places[:, 1] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["e08", "f04"])
+def test_segments_are_those_of_the_recorded_states(name):
+    """IPOPT finds the states of tests/data/rod with the law of its segments in the place of the rod's elements."""
+    recorded = json.loads((DATA / f"{name}.json").read_text())
+    spec, state = recorded["spec"], recorded["states"][-1]
+    spheres = tuple((tuple(sphere["center"]), sphere["radius"]) for sphere in spec["obstacles"])
+    rod = replace(
+        PROTOTYPE,
+        torsion_ratio=spec["GJ"][0] / spec["EI"][0],
+        cables=tuple(Cable(cable["offset"], cable["angle"], LENGTH) for cable in spec["cables"]),
+        stations=18,
+        touch=tuple((point["offset"], point["angle"]) for point in spec["touch"]),
+        spheres=spheres,
+        law=segment,
+    )
+    found = rod.pulled(*spec["path"][0], steps=32)
+    assert found.places == pytest.approx(np.array(state["positions"]), abs=1e-6)
+    assert found.frames == pytest.approx(np.array(state["rotations"]), abs=1e-8)
+    assert found.tensions == pytest.approx(state["tensions"], abs=1e-7)
+    assert found.forces == pytest.approx(np.array(state["obstacle_forces"]), abs=1e-7)
