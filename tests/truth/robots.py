@@ -18,6 +18,8 @@ from solver import spatial
 
 Spec = Mapping[str, Any]
 PLANE, SPACE = ({field.name for field in fields(robot)} for robot in (solver.Robot, spatial.SpatialRobot))
+if hasattr(solver, "Load"):
+    PLANE, SPACE = (known | {f"loads.{field.name}" for field in fields(solver.Load)} for known in (PLANE, SPACE))
 
 
 class Reading(NamedTuple):
@@ -64,7 +66,7 @@ def require(spec: Spec) -> Spec:
 def missing(spec: Spec) -> str:
     """Return what the package's robots lack to build a description, empty if nothing."""
     known, needed = (SPACE, _needs_in_space(spec)) if spec["space"] else (PLANE, _needs(spec))
-    lacking = sorted(needed - known)
+    lacking = sorted(name for name in needed - known if name.split(".")[0] == name or "loads" in known)
     return f"robots of {'space' if spec['space'] else 'the plane'} have no {', '.join(lacking)}" if lacking else ""
 
 
@@ -120,9 +122,9 @@ def _has_default_cable(spec: Spec) -> bool:
 def _needs(spec: Spec) -> set[str]:
     """Return the fields that a description needs beside those every robot has."""
     needed = {name for name in ("weight_per_length", "precurvature") if np.any(spec.get(name, 0))}
-    needed |= {"loads"} if spec.get("loads") else set()
-    needed |= {"model"}
-    return needed | (set() if _has_default_cable(spec) else {"cables"})
+    for load in spec.get("loads", []):
+        needed |= {"loads", *(f"loads.{name}" for name in load if np.any(load[name]))}
+    return needed | {"model"} | (set() if _has_default_cable(spec) else {"cables"})
 
 
 def _needs_in_space(spec: Spec) -> set[str]:
@@ -150,7 +152,7 @@ def _robot(spec: Spec) -> dict[str, Any]:
     if spec.get("loads"):
         arguments["loads"] = tuple(_load(load) for load in spec["loads"])
     if np.any(spec.get("precurvature", 0)):
-        arguments["precurvature"] = spec["precurvature"]
+        arguments["precurvature"] = tuple(np.array(spec["precurvature"]).tolist())
     return arguments
 
 
@@ -196,10 +198,12 @@ def _cable(cable: Mapping[str, Any], count: int) -> Any:
 
 
 def _load(load: Mapping[str, Any]) -> Any:
-    known = {name: load[name] for name in ("node", "force", "moment") if name in load}
-    at = load.get("at")
-    place = {"at": (at["offset"], at["angle"])} if at else {}
-    return getattr(solver, "Load")(**known, **place)  # noqa: B009
+    arguments = {"node": load["node"], "force": tuple(load["force"])}
+    if load.get("moment"):
+        arguments["moment"] = load["moment"]
+    if "at" in load:
+        arguments["at"] = (load["at"]["offset"], load["at"]["angle"])
+    return getattr(solver, "Load")(**arguments)  # noqa: B009
 
 
 def _obstacle(obstacle: Mapping[str, Any]) -> Any:

@@ -96,16 +96,19 @@ def sampled(seed):
     return angles, (centre, radius), [pull if pull > 0 else pull - 0.5 for pull in pulls]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 2, 3, 4, 5, 7, 9, 10])  # those of the first eleven that touch, 8 by four points
 def test_random_contacts(seed):
-    """Forces, tensions and places agree to the order of the discretisation."""
+    """Forces, tensions and places differ by the order of the discretisation, and by no more than measured."""
     angles, sphere, pulls = sampled(seed)
     robots.require(robots.space(COMMON, *angles))
     exact = rod(*angles, spheres=(sphere,)).pulled(*pulls, steps=20)
-    assert np.linalg.norm(exact.forces) > 0.1 * FORCE
-    for n in (18, 36, 72):
-        found = errors(robots.pulled(robots.space(n, *angles, obstacles=balls(n, sphere)), *pulls), exact)
-        assert np.all(found < np.array([0.5, 1.0, 15.0, 15.0]) / n**2), found * n**2
+    assert np.linalg.norm(exact.forces) > 0.3 * FORCE
+
+    def among(n):
+        return robots.space(n, *angles, obstacles=balls(n, sphere))
+
+    assert np.all(errors(robots.pulled(among(18), *pulls), exact) < np.array([1.0, 1.5, 8.0, 13.0]) / 18**2)
+    converges(among, exact, *pulls)
 
 
 @pytest.mark.parametrize("angles", [RIGHT_ANGLE, THIRDS])
@@ -148,39 +151,59 @@ def test_two_sections():
     converges(sections, exact, *pulls)
 
 
+def directions():
+    return 2 * math.pi * np.arange(12) / 12
+
+
+def assert_isotropic(deflections, exact):
+    """Deflections over the direction for 9, 18, 36 segments: 1/n² from the exact one, and from one another."""
+    spread = np.ptp(deflections, axis=1)
+    assert np.all(spread[:-1] > 3.6 * spread[1:]), spread
+    for n, row in zip((9, 18, 36), deflections, strict=True):
+        assert row == pytest.approx(exact, rel=1 / n**2)
+
+
 @pytest.mark.parametrize("count", [3, 4, 5, 6])
-def test_even_cables_are_isotropic(count):
-    """The tip's deflection per load over the load's direction: 24 directions, anisotropy that falls as 1/n².
+def test_even_cables_turn_the_tip_alike_in_all_directions(count):
+    """Pulled to a turn of 0.5 rad, the tip goes (1 − cos 0.5) / 0.5 of the length to that side, wherever that is.
 
-    Pulled to a turn of 0.5 rad in the direction of the load, with the cables of the far side paid out, the robot
-    deflects by (1 − cos 0.5)/0.5 of its length whatever the direction; with slack cables alone a small load gives
-    F L³ / 3EI.
+    Cables beyond the two beside the direction are paid out by 0.3 mm more: without, they lock in second order.
     """
-    angles = [2 * math.pi * k / count for k in range(count)]
+    angles = 2 * math.pi * np.arange(count) / count
     robots.require(robots.space(9, *angles))
-    turn, spread = 0.5, []
-    for n in (9, 18, 36):
-        tips = [_tip(n, angles, turn, direction) for direction in 2 * math.pi * np.arange(24) / 24]
-        deflections = np.array([np.hypot(*tip[:2]) for tip in tips])
-        assert deflections == pytest.approx((1 - math.cos(turn)) / turn * LENGTH, rel=0.6 / n**2)
-        spread.append(np.ptp(deflections))
-    assert np.all(np.array(spread[:-1]) > 3.6 * np.array(spread[1:])), spread
+
+    def deflection(n, direction):
+        off = (angles - direction + math.pi) % (2 * math.pi) - math.pi
+        pulls = OFFSET * 0.5 * np.cos(off) - 0.3 * (np.abs(off) > 2 * math.pi / count - 1e-9)
+        tip = robots.read(robots.pulled(robots.space(n, *angles), *pulls, steps=4)).places[-1]
+        return tip[:2] @ [math.cos(direction), math.sin(direction)]
+
+    found = np.array([[deflection(n, direction) for direction in directions()] for n in (9, 18, 36)])
+    assert_isotropic(found, (1 - math.cos(0.5)) / 0.5 * LENGTH)
 
 
-def _tip(n, angles, turn, direction):
-    pulls = [OFFSET * turn * math.cos(angle - direction) for angle in angles]
-    pulls = [pull if pull > 1e-9 else pull - 0.3 for pull in pulls]
-    return robots.read(robots.pulled(robots.space(n, *angles), *pulls, steps=4)).places[-1]
+def tip_under(n, angles, size, direction, pull):
+    """Deflection of the tip, along a small force at it, over the force [mm/N]."""
+    along = np.array([math.cos(direction), math.sin(direction), 0.0])
+    spec = robots.space(n, *angles, loads=[{"node": n, "force": (size * along).tolist()}])
+    return robots.read(robots.pulled(spec, *[pull] * len(angles), steps=1)).places[-1] @ along / size
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 6])
+def test_even_cables_give_way_alike_in_all_directions(count):
+    """A small force at the tip: F L³ / 12EI with all cables at rest, which keep the tip upright."""
+    angles = 2 * math.pi * np.arange(count) / count
+    robots.require(robots.space(9, *angles, loads=[{"node": 9, "force": [0.0, 0.0, 0.0]}]))
+    sizes = (9, 18, 36)
+    found = np.array([[tip_under(n, angles, 0.1 * FORCE, way, 0.0) for way in directions()] for n in sizes])
+    assert_isotropic(found, LENGTH**3 / (12 * RIGIDITY))
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 6])
 def test_slack_cables_leave_a_cantilever(count):
-    angles = [2 * math.pi * k / count for k in range(count)]
-    size = 1e-3 * FORCE
-    robots.require(robots.space(18, *angles, loads=[{"node": 18, "force": [size, 0.0, 0.0]}]))
-    for direction in 2 * math.pi * np.arange(8) / 8:
-        force = [size * math.cos(direction), size * math.sin(direction), 0.0]
-        spec = robots.space(18, *angles, loads=[{"node": 18, "force": force}])
-        tip = robots.read(robots.pulled(spec, *[-0.5] * count, steps=1)).places[-1]
-        exact = np.array(force[:2]) * LENGTH**3 / (3 * RIGIDITY)
-        assert tip[:2] == pytest.approx(exact, abs=1e-3 * np.linalg.norm(exact))
+    """A small force at the tip: F L³ / 3EI with all cables paid out."""
+    angles = 2 * math.pi * np.arange(count) / count
+    robots.require(robots.space(9, *angles, loads=[{"node": 9, "force": [0.0, 0.0, 0.0]}]))
+    found = np.array([tip_under(18, angles, 1e-2 * FORCE, direction, -0.5) for direction in directions()])
+    assert found == pytest.approx(LENGTH**3 / (3 * RIGIDITY), rel=1e-3)
+    assert np.ptp(found) < 1e-5 * found[0]
