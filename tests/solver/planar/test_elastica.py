@@ -1,115 +1,170 @@
-"""The rod model against the elastica it discretises: a beam with a frictionless cable, pressed by a wall.
-
-With the bending angle θ = −φ, the curvature κ = θ' and the wall's force (−N, 0) at arc length s_c, the beam obeys
-EI κ = T a − N (y(s_c) − y) below s_c and EI κ = T a beyond; x(s_c) = d and a θ(L) = l fix T and N.
-"""
+"""The rod against the elastica of an independent program (tests/truth/elastica.py), to which it must tend as 1/n²."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_bvp
-
-from solver import HalfPlane, Robot, Scene, Solver, Status
-from solver.planar.forces import force_true
+from scipy.optimize import brentq
+from truth import robots
+from truth.elastica import Beam, Cable, Contact, Load, circle, solve, wall
 
 LENGTH, OFFSET, RIGIDITY = 180.0, 8.0, 5000.0
 COMMON = np.linspace(0, LENGTH, 10)  # where every refinement has a node
-TOUCHING = 7
-CONTACT = COMMON[TOUCHING]
-REFINEMENTS = (9, 18, 36, 72)
+CELL = 140.0  # arc length of the node that meets the load cell, index 14 of 18
+REFINEMENTS = (18, 36, 72, 144)
+BEAM = {"length": LENGTH, "rigidity": RIGIDITY}
+GRAM = 9.80665e-3  # [N]
+UNIT = RIGIDITY / LENGTH**2  # of force [N]
 
 
-class State(NamedTuple):
-    """Poses (x, y, φ) at the common nodes, cable tension, and force of the wall on the robot."""
-
-    poses: np.ndarray
-    tension: float
-    force: np.ndarray
+def beam(pull, *contacts, **further):
+    """The prototype as a beam."""
+    return Beam(**BEAM, cables=(Cable(OFFSET, LENGTH, pull),) if pull else (), contacts=contacts, **further)
 
 
-def arc(pose, curvature, along):
-    """Poses at arc lengths along a circle from a pose on, (k, 3)."""
-    x, y, phi = pose
-    turned = phi - curvature * along
-    right, ahead = np.cos(phi) - np.cos(turned), np.sin(phi) - np.sin(turned)
-    return np.column_stack([x + right / curvature, y + ahead / curvature, turned])
-
-
-def free_rod(cable_mm):
-    """The rod that nothing touches: one arc."""
-    curvature = cable_mm / (OFFSET * LENGTH)
-    return State(arc(np.zeros(3), curvature, COMMON), RIGIDITY * curvature / OFFSET, np.zeros(2))
-
-
-def rod_at_wall(cable_mm, wall_mm):
-    """The rod at a wall: up to the contact EI κ' = N cos θ with N unknown, an arc from there on."""
-
-    def slopes(_, state, force):
-        _, _, phi, curvature = state
-        return np.stack([-np.sin(phi), np.cos(phi), -curvature, force[0] / RIGIDITY * np.cos(phi)])
-
-    def mismatch(base, contact, _):
-        tip = contact[2] - contact[3] * (LENGTH - CONTACT)
-        return np.array([*base[:3], contact[0] - wall_mm, OFFSET * tip + cable_mm])
-
-    mesh = np.linspace(0, CONTACT, 50)
-    straight = np.stack([0 * mesh, mesh, 0 * mesh, 0 * mesh])
-    rod = solve_bvp(slopes, mismatch, mesh, straight, p=[0.0], tol=1e-10, max_nodes=10_000)
-    assert rod.success, rod.message
-    *pose, curvature = rod.y[:, -1]
-    poses = [rod.sol(COMMON[:TOUCHING])[:3].T, arc(pose, curvature, COMMON[TOUCHING:] - CONTACT)]
-    return State(np.concatenate(poses), RIGIDITY * curvature / OFFSET, np.array([-rod.p[0], 0.0]))
-
-
-def pulled(segments, cable_mm, *walls_mm):
-    """The solver's robot, pulled in increments towards walls that only the node at the contact meets."""
-    robot = Robot(
-        length_mm=LENGTH,
-        segments=segments,
-        offset_mm=OFFSET,
-        rigidity=RIGIDITY,
-        max_tension=math.inf,
-        model="rod",
-        touch=("backbone",),
+def errors(equilibrium, exact):
+    """Largest error of a place, of an angle, of a tension and of a force [mm, rad, N, N]."""
+    found, poses = robots.read(equilibrium), exact.poses(COMMON)
+    every = (len(found.places) - 1) // (len(COMMON) - 1)
+    missed = (
+        np.hypot(*(found.places[::every] - poses[:, :2]).T).max(),
+        np.abs(found.frames[::every] - poses[:, 2]).max(),
     )
-    every = segments // 9
-    walls = [HalfPlane(point=(wall, 0.0), normal=(-1.0, 0.0), nodes=(TOUCHING * every,)) for wall in walls_mm]
-    solver = Solver(robot, Scene(walls))
-    equilibrium = solver.rest()
-    for command in [*np.arange(0.5, cable_mm, 0.5), cable_mm]:
-        equilibrium = solver.step(equilibrium, command)
-        assert equilibrium.status is Status.CONVERGED
-    return State(equilibrium.nodes[::every], equilibrium.tension, force_true(equilibrium).sum(axis=0))
-
-
-def errors(state, rod):
-    """Largest error of position and of angle, error of tension and of force [mm, rad, N, N]."""
-    poses, tension, force = (np.abs(value - exact) for value, exact in zip(state, rod, strict=True))
-    return np.array([np.hypot(poses[:, 0], poses[:, 1]).max(), poses[:, 2].max(), tension, np.hypot(*force)])
+    taut = found.tensions[: len(exact.tensions)]
+    missed += (np.abs(taut - exact.tensions).max(initial=0),)
+    return np.array([*missed, np.abs(found.forces - exact.forces.reshape(found.forces.shape)).max(initial=0)])
 
 
 def assert_second_order(table):
-    """Twice the segments, a quarter of every error."""
-    assert np.all((table[:-1] > 3.5 * table[1:]) & (table[:-1] < 4.5 * table[1:])), table
+    """Twice the segments, a quarter of every error that is there."""
+    table = np.array(table)
+    table = table[:, table[0] > 0]
+    ratios = table[:-1] / table[1:]
+    assert np.all((ratios > 3.6) & (ratios < 4.4)), ratios
+
+
+def converges(make_spec, exact, *pulls):
+    """Assert that robots of ever more segments tend to a beam as 1/n²."""
+    robots.require(make_spec(REFINEMENTS[0]))
+    assert_second_order([errors(robots.pulled(make_spec(n), *pulls, steps=30), exact) for n in REFINEMENTS])
+
+
+def cell(distance, line=OFFSET):
+    """The paper's load cell as a contact of the beam."""
+    return Contact(wall((distance, 127.0), (-1.0, 0.0)), line, CELL)
+
+
+def at_cell(n, distance, offset=OFFSET):
+    """The prototype at the load cell, which only the point at one disk touches."""
+    obstacle = {"kind": "wall", "normal": [-1.0, 0.0], "offset": -distance, "nodes": (round(n * CELL / LENGTH),)}
+    return robots.plane(n, obstacles=[obstacle], touch=[{"offset": offset, "angle": 0.0}])
 
 
 def test_free_robot_tends_to_the_arc():
-    rod = free_rod(7.0)
-    table = np.array([errors(pulled(segments, 7.0), rod) for segments in REFINEMENTS])
-    assert_second_order(table[:, :3])  # the force is zero on both sides
+    converges(robots.plane, solve(beam(7.0)), 7.0)
 
 
-def test_robot_at_a_wall_tends_to_the_elastica():
-    rod = rod_at_wall(7.0, 31.0)
-    table = np.array([errors(pulled(segments, 7.0, 31.0), rod) for segments in REFINEMENTS])
-    assert_second_order(table)
+@pytest.mark.parametrize("line", [0.0, OFFSET], ids=["backbone", "cable"])
+def test_robot_at_a_wall_tends_to_the_elastica(line):
+    converges(lambda n: at_cell(n, 31.0, line), solve(beam(7.0, cell(31.0, line))), 7.0)
 
 
-@pytest.mark.parametrize("state", [lambda: rod_at_wall(0.1, 1e-4), lambda: pulled(72, 0.1, 1e-4)], ids=["rod", "robot"])
-def test_small_deflection_divides_force_and_tension_as_a_propped_beam(state):
+def test_robot_at_a_circle_tends_to_the_elastica():
+    """The circle of Fig. 4a, shifted to where it touches at a node of every refinement.
+
+    Other nodes are free to touch it and do not.
+    """
+
+    def touched(height):
+        return solve(beam(8.0, Contact(circle((44.0, height), 15.0), OFFSET, 120.0, free=True)))
+
+    height = brentq(lambda y: touched(y).places[0] - 120, 103.5, 105.0, xtol=1e-10)
+    obstacle = {"kind": "circle", "center": [44.0, height], "radius": 15.0}
+    converges(lambda n: robots.plane(n, obstacles=[obstacle]), touched(height), 8.0)
+
+
+def test_force_of_disks_between_which_the_circle_touches():
+    """Disks that touch beside the true place of contact make an error of the first order, ± half a segment at most."""
+    exact = solve(beam(8.0, Contact(circle((44.0, 104.0), 15.0), OFFSET, 120.0, free=True)))
+    obstacle = {"kind": "circle", "center": [44.0, 104.0], "radius": 15.0}
+    for n in REFINEMENTS:
+        (force,) = robots.read(robots.pulled(robots.plane(n, obstacles=[obstacle]), 8.0)).forces
+        assert math.hypot(*force) == pytest.approx(math.hypot(*exact.forces[0]), rel=0.75 / n)
+
+
+@pytest.mark.parametrize("distance", [24.0, 31.0, 36.0, 51.0])
+def test_load_cell_of_the_paper(distance):
+    """At a load P on the cable beyond its tension at the onset, as Table 1 has it, the force is right to 0.7 %."""
+    curvature = brentq(lambda k: (1 - math.cos(k * CELL)) / k + OFFSET * math.cos(k * CELL) - distance, 1e-6, 0.02)
+    onset, pull = RIGIDITY * curvature / OFFSET, OFFSET * curvature * LENGTH
+    compared = 0
+    for equilibrium in robots.follow(at_cell(18, distance), [np.array([p]) for p in np.linspace(0.2, pull + 4, 40)]):
+        load = equilibrium.tension - equilibrium.onset_tension
+        if not (equilibrium.contact.any() and 50 * GRAM < load < 350 * GRAM):
+            continue
+        tip_moment = Load(LENGTH, (0.0, 0.0), -OFFSET * (onset + load))
+        exact = solve(beam(0.0, cell(distance), loads=(tip_moment,)))
+        assert -equilibrium.forces[0, 0] == pytest.approx(-exact.forces[0, 0], rel=0.007)
+        compared += 1
+    assert compared >= 10
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        lambda: (lambda beam: (beam.tensions, beam.forces))(solve(beam(0.1, cell(1e-4, 0.0)))),
+        lambda: robots.read(robots.pulled(at_cell(72, 1e-4, 0.0), 0.1))[2:],
+    ],
+    ids=["beam", "robot"],
+)
+def test_small_deflection_divides_force_and_tension_as_a_propped_beam(found):
     """N / T = 3a / 2s_c for a wall that holds the contact where it is."""
-    _, tension, (force, across) = state()
-    assert -force / tension == pytest.approx(1.5 * OFFSET / CONTACT, rel=2e-4)
+    (tension,), ((force, across),) = found()
+    assert -force / tension == pytest.approx(1.5 * OFFSET / CELL, rel=2e-4)
     assert across == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [0.1, 2.0], ids=["small", "large"])
+def test_cantilever_under_its_own_weight(size):
+    """The cable, on the side it bends to, is slack; a small weight makes the tip sag by w L⁴ / 8EI."""
+    weight = (size * RIGIDITY / LENGTH**3, 0.0)
+    exact = solve(beam(0.0, weight=weight))
+    if size < 1:
+        assert exact.poses(LENGTH)[0, 0] == pytest.approx(weight[0] * LENGTH**4 / (8 * RIGIDITY), rel=1e-3)
+    converges(lambda n: robots.plane(n, weight_per_length=weight), exact, 0.0)
+
+
+def test_pulled_robot_that_stands_up_and_hangs():
+    for along in (-8e-4, 8e-4):
+        weight = (0.0, along)
+        converges(lambda n, w=weight: robots.plane(n, weight_per_length=w), solve(beam(7.0, weight=weight)), 7.0)
+
+
+def test_loads_at_the_tip_and_at_a_disk():
+    """A transverse force of 2 EI/L² at the tip, and forces and moments at the tip and at two thirds."""
+    across = (Load(LENGTH, (2 * UNIT, 0.0)),)
+    several = (Load(LENGTH, (0.03, 0.02), -2.0), Load(120.0, (-0.1, 0.0), 3.0))
+    for loads, pull in ((across, 0.0), (several, 8.0)):
+        exact = solve(beam(pull, loads=loads))
+        converges(lambda n, loads=loads: robots.plane(n, loads=[_described(load, n) for load in loads]), exact, pull)
+
+
+def _described(load, n):
+    return {"node": round(n * load.at / LENGTH), "force": list(load.force), "moment": load.moment}
+
+
+@pytest.mark.parametrize("opposing", [False, True])
+def test_two_sections_tend_to_two_arcs(opposing):
+    """Closed form: θ = pull / a at both ends, each section an arc, T₂ a₂ = M₂ and T₁ a₁ = M₁ − M₂."""
+    half, (first, second) = LENGTH / 2, (4.0, 4.0) if opposing else (6.0, 5.0)
+    offset = -6.0 if opposing else 6.0
+    exact = solve(Beam(**BEAM, cables=(Cable(OFFSET, half, first), Cable(offset, LENGTH, second))))
+    moments = np.diff([0.0, first / OFFSET, second / offset]) * RIGIDITY / half
+    assert exact.tensions == pytest.approx([(moments[0] - moments[1]) / OFFSET, moments[1] / offset], rel=1e-10)
+
+    def sections(n):
+        angle = math.pi if opposing else 0.0
+        ends = [{"offset": OFFSET, "angle": 0.0, "end": n // 2}, {"offset": abs(offset), "angle": angle, "end": n}]
+        return robots.plane(n, cables=ends)
+
+    converges(sections, exact, first, second)
