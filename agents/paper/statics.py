@@ -113,7 +113,7 @@ def _maximum_error() -> Claim:
         "section 4.1",
         Verdict.UNTESTABLE,
         f"said of Fig. 10a, at d = {published.FIG_10A_MM:.0f} mm, whose numbers are not printed. At the distances of "
-        f"Table 1 the largest errors are {ERRORS.max(axis=1).round(1).tolist()} g, 1.9 g at 24 mm next to it",
+        f"Table 1 the largest errors are {ERRORS.max(axis=1).round(1).tolist()} g, the first at 24 mm, next to it",
     )
 
 
