@@ -211,10 +211,10 @@ class BenchConfig:
 
 @dataclass(frozen=True, slots=True)
 class ReproduceConfig:
-    """Reproduce the paper's figures and table, and check its claims in numbers."""
+    """Put each of the paper's claims to the test, and reproduce its figures and Table 1."""
 
     out: Path = Path("runs/paper")
-    """Folder for paper.png and paper.json."""
+    """Folder for paper.md, its figures table_1.png and paper.png, and paper.json."""
 
 
 def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:

@@ -10,6 +10,16 @@ from solver.common.trace import Trace
 from solver.planar.batch import BatchSolver, ReferenceBatch
 from solver.planar.custom import Custom
 from solver.planar.equilibrium import Equilibrium
+from solver.planar.estimators import (
+    Motion,
+    RigidityFit,
+    contact_estimate,
+    force_factor,
+    free_motion,
+    point_forces,
+    shape_estimate,
+    shape_motion,
+)
 from solver.planar.family import Family
 from solver.planar.forces import VirtualWork, force_true, onset_tension, virtual_work
 from solver.planar.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes
@@ -31,12 +41,14 @@ __all__ = [
     "Family",
     "HalfPlane",
     "Load",
+    "Motion",
     "Obstacle",
     "Optimality",
     "Polygon",
     "ReferenceBatch",
     "ReferenceSolver",
     "Residuals",
+    "RigidityFit",
     "Robot",
     "Scene",
     "Sensitivity",
@@ -46,12 +58,18 @@ __all__ = [
     "TransitionMemo",
     "VirtualWork",
     "clearance",
+    "contact_estimate",
     "fitted_slopes",
+    "force_factor",
     "force_true",
+    "free_motion",
     "free_nodes",
     "free_tension",
     "onset_tension",
+    "point_forces",
     "sensitivity",
+    "shape_estimate",
+    "shape_motion",
     "tip_slopes",
     "virtual_work",
 ]

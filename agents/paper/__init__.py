@@ -1,1 +1,1 @@
-"""The paper's results, reproduced."""
+"""The paper put to the test: its claims, its Table 1 and its figures."""

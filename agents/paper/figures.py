@@ -1,4 +1,4 @@
-"""The paper's figures and Table 1 on one page."""
+"""The comparison with Table 1, and the paper's figures on one page."""
 
 import math
 from pathlib import Path
@@ -9,17 +9,43 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from agents.benchmark.shapes import Axes3D, draw_shape
 from agents.files import replacing
 from agents.paper import published
+from agents.paper.comparison import predictions
 from agents.paper.model import FIT_RANGE_MM, ROBOT, calibrate, force_per_load, pull, pull_in_space, table_1
 from agents.paper.published import LOADS_G, MEASURED_G
 from solver import Scene, fitted_slopes, free_nodes
 
+STYLES = {  # of the four predictions: colour, and dashes by the estimate
+    "paper model, energy force": ("#c0662b", "-"),
+    "paper model, virtual work, μ = 0": ("#c0662b", "--"),
+    "rod, energy force": ("#1f3a7a", "-"),
+    "rod, virtual work, μ = 0": ("#1f3a7a", "--"),
+}
 
-def draw(path: Path) -> None:
-    """Draw Fig. 3b, 4a, 4b, 5, 7, 9, 10a, 10b, 11 and Table 1."""
+
+def draw_comparison(path: Path) -> None:
+    """Draw the measured forces of Table 1 and the four predictions of them, a panel for each distance."""
+    figure, axes = plt.subplots(1, len(MEASURED_G), figsize=(15, 4.6), sharex=True, sharey=True, layout="constrained")
+    forces = predictions()
+    for row, (axis, (distance, measured)) in enumerate(zip(axes, MEASURED_G.items(), strict=True)):
+        for name, (color, dashes) in STYLES.items():
+            axis.plot([0, *LOADS_G], [0, *forces[name][row]], dashes, color=color, label=name)
+        axis.plot(LOADS_G, measured, "o", color="black", ms=5, label="measured (Table 1)", zorder=3)
+        axis.set(title=f"d = {distance} mm", xlabel="cable load P_l [gf]", xlim=(0, 360))
+        axis.grid(alpha=0.3)
+    axes[0].set(ylabel="force on the load cell [gf]", ylim=(0, None))
+    figure.suptitle("Table 1 and four predictions without any fitted constant, read at T = T_onset + P_l")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    _save(figure, path)
+
+
+def draw_figures(path: Path) -> None:
+    """Draw Fig. 3b, 4a, 4b, 5, 7, 9, 10a, 10b, 11 and the errors of Table 1."""
     figure = plt.figure(figsize=(22, 9), layout="constrained")
     axes = [figure.add_subplot(2, 5, k + 1) for k in range(9)]
     _draw_profiles(axes[0])
@@ -32,6 +58,10 @@ def draw(path: Path) -> None:
     _draw_contact_points(axes[7])
     _draw_errors(axes[8])
     _draw_space(figure.add_subplot(2, 5, 10, projection="3d"))
+    _save(figure, path)
+
+
+def _save(figure: Figure, path: Path) -> None:
     with replacing(path) as partial:
         figure.savefig(partial, dpi=100)
     plt.close(figure)
@@ -72,15 +102,22 @@ def _draw_tip(axis: Axes) -> None:
 def _draw_forces(axis: Axes) -> None:
     for distance, measured in MEASURED_G.items():
         axis.plot(LOADS_G, measured, "o", ms=4, label=f"measured, d = {distance} mm")
-    axis.plot(LOADS_G, table_1(*calibrate()), "k-", label="eq. 11")
-    axis.set(title="Fig. 10, Table 1: contact force", xlabel="cable load [g]", ylabel="force [g]")
+    axis.plot(LOADS_G, table_1(*calibrate()), "k-", label="eq. 11, μ fitted: c·P_l")
+    axis.set(title="Table 1: contact force", xlabel="cable load [g]", ylabel="force [g]")
     axis.legend(fontsize=8)
 
 
 def _draw_contact_points(axis: Axes) -> None:
-    """Draw eq. 11 with the slopes of several nodes that touch, for which the paper prints no numbers."""
-    estimator, _ = calibrate()
+    """Draw eq. 11 with the slopes of several nodes that touch, for which the paper prints no numbers.
+
+    The load cell's disk gets another force than in Table 1.
+    """
+    estimator, tip = calibrate()
     loads = np.array([0, *LOADS_G])
+    ratio = force_per_load(estimator, tip)
+    axis.plot(
+        loads, ratio * loads, "k--", lw=1, label=f"Fig. 10a, node {published.CELL_NODE + 1}: {ratio:.3f} per load"
+    )
     for node in published.FIG_10B_NODES:
         ratio = force_per_load(estimator, fitted_slopes(ROBOT, *FIT_RANGE_MM, node=node))
         axis.plot(loads, ratio * loads, "o-", ms=3, label=f"node {node + 1}: {ratio:.3f} per load")

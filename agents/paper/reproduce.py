@@ -1,18 +1,37 @@
-"""Reproduction of the paper: its figures and Table 1, and which of its claims hold."""
+"""The paper put to the test: a verdict on each of its claims, its Table 1 beside four predictions, and its figures."""
 
 import json
 from dataclasses import asdict
 from pathlib import Path
 
 from agents.files import write_text
-from agents.paper.claims import Claim, claims
-from agents.paper.figures import draw
+from agents.paper.claims import claims
+from agents.paper.comparison import scores
+from agents.paper.figures import draw_comparison, draw_figures
+from agents.paper.report import markdown, show
+from agents.paper.verdict import Claim
 
 
 def reproduce(folder: Path) -> list[Claim]:
-    """Write ``paper.png`` and ``paper.json`` into a folder; return the claims."""
+    """Write the page ``paper.md``, its figures and ``paper.json`` into a folder, print it, and return the claims."""
     folder.mkdir(parents=True, exist_ok=True)
-    found = claims()
-    draw(folder / "paper.png")
-    write_text(folder / "paper.json", json.dumps([asdict(claim) for claim in found], indent=2) + "\n")
+    found, scored = claims(), scores()
+    draw_comparison(folder / "table_1.png")
+    draw_figures(folder / "paper.png")
+    values = {
+        "claims": [asdict(claim) for claim in found],
+        "table_1": {name: asdict(score) for name, score in scored.items()},
+    }
+    write_text(folder / "paper.json", json.dumps(_without_nan(values), indent=2, ensure_ascii=False) + "\n")
+    write_text(folder / "paper.md", markdown(found, scored))
+    show(found, scored)
     return found
+
+
+def _without_nan(values: object) -> object:
+    """Return JSON values with None in the place of numbers that do not exist."""
+    if isinstance(values, dict):
+        return {key: _without_nan(value) for key, value in values.items()}
+    if isinstance(values, list):
+        return [_without_nan(value) for value in values]
+    return None if values != values else values

@@ -7,12 +7,12 @@ from solver.common.scene import Scene
 
 
 def subdivide(lines: np.ndarray, between: int) -> np.ndarray:
-    """Return lines ``(p, n+1, d)`` with ``between`` evenly spaced points added between every two."""
-    segments = lines.shape[1] - 1
+    """Return lines ``(..., n+1, d)`` with ``between`` evenly spaced points added between every two."""
+    segments = lines.shape[-2] - 1
     position = np.arange(segments * (between + 1) + 1) / (between + 1)
     node = np.minimum(position.astype(int), segments - 1)
     fraction = (position - node)[:, None]
-    return np.asarray((1 - fraction) * lines[:, node] + fraction * lines[:, node + 1])
+    return np.asarray((1 - fraction) * lines[..., node, :] + fraction * lines[..., node + 1, :])
 
 
 def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:

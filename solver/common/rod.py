@@ -13,6 +13,7 @@ from solver.common.validation import (
     check_finite,
     check_instance,
     check_number,
+    check_pair,
     check_point,
     check_positive,
     check_sequence,
@@ -67,8 +68,8 @@ class Load:
         node: Node of the disk, from 1 on.
         force: Force [N].
         moment: Moment, counter-clockwise, in the plane only [N·mm]; in space a couple of two forces takes its place.
-        offset_mm: Distance from the backbone of the point of the disk where the force acts [mm].
-        angle: Direction of that point from the backbone, from +x on [rad]; in the plane 0 or π.
+        at: Point of the disk where the force acts: its distance from the backbone [mm], and its direction from +x on
+            [rad], in the plane 0 or π.
 
     Raises:
         ValueError: If a value is not finite, or out of range.
@@ -77,8 +78,7 @@ class Load:
     node: int
     force: tuple[float, ...]
     moment: float = 0.0
-    offset_mm: float = 0.0
-    angle: float = 0.0
+    at: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         assign = object.__setattr__
@@ -86,13 +86,13 @@ class Load:
         space = len(check_sequence("force of a load", self.force, "two or three numbers"))
         assign(self, "force", check_point("force of a load", self.force, 3 if space == 3 else 2))
         assign(self, "moment", check_finite("moment of a load", self.moment))
-        assign(self, "offset_mm", check_number("offset_mm of a load", self.offset_mm, 0.0, 1e30, "not negative"))
-        assign(self, "angle", check_finite("angle of a load", self.angle, 1e3))
+        assign(self, "at", check_pair("at of a load", self.at))
 
     @property
     def place_mm(self) -> tuple[float, float]:
         """Point of the disk where the force acts, from the backbone [mm]."""
-        return self.offset_mm * math.cos(self.angle), self.offset_mm * math.sin(self.angle)
+        distance, angle = self.at
+        return distance * math.cos(angle), distance * math.sin(angle)
 
 
 class AnyRod(AnyRobot, Protocol):
@@ -202,8 +202,8 @@ def _checked_loads(robot: AnyRod, space: int) -> tuple[Load, ...]:
         if space == 3 and load.moment:
             raise refusal("moment of a load", load.moment, "0 in space: take two forces")
         check_number("moment of a load", abs(load.moment), 0.0, most * robot.longest_mm, f"{bound} times L")
-        if space == 2 and load.offset_mm:
-            _check_side("angle of a load", load.angle)
+        if space == 2 and load.at[0]:
+            _check_side("angle of a load", load.at[1])
     return tuple(loads)  # type: ignore[arg-type]
 
 

@@ -140,11 +140,13 @@ def _robot(spec: Spec) -> dict[str, Any]:
         "length_mm": math.fsum(spec["segment_mm"]),
         "segments": count,
         "offset_mm": offset,
-        "rigidity": _each(spec["EI"]),
+        "rigidity": float(np.mean(spec["EI"])),
         "max_tension": math.inf,
         **_touch(spec, offset),
         **_disks(spec, offset),
     }
+    if np.ptp(spec["EI"]):
+        arguments["segment_rigidity"] = tuple(spec["EI"])
     if not _has_default_cable(spec):
         arguments["cables"] = tuple(_cable(cable, count) for cable in spec["cables"])
     if np.any(spec.get("weight_per_length", 0)):
@@ -194,7 +196,7 @@ def _touch(spec: Spec, offset: float) -> dict[str, Any]:
 
 def _cable(cable: Mapping[str, Any], count: int) -> Any:
     end = None if cable["end"] == count else cable["end"]
-    return getattr(solver, "Cable")(angle=cable["angle"], offset_mm=cable["offset"], end=end)  # noqa: B009
+    return solver.Cable(angle=cable["angle"], offset_mm=cable["offset"], end=end)
 
 
 def _load(load: Mapping[str, Any]) -> Any:
@@ -203,7 +205,7 @@ def _load(load: Mapping[str, Any]) -> Any:
         arguments["moment"] = load["moment"]
     if "at" in load:
         arguments["at"] = (load["at"]["offset"], load["at"]["angle"])
-    return getattr(solver, "Load")(**arguments)  # noqa: B009
+    return solver.Load(**arguments)
 
 
 def _obstacle(obstacle: Mapping[str, Any]) -> Any:

@@ -1,0 +1,247 @@
+"""Contact force by virtual work at the point that touches, from what a real robot measures.
+
+For any motion that the robot can make while its cable moves by dl, the work of cable and contacts is the change of
+energy: ``B dJ/dl = T + Σ F_j·x_j'`` with ``B = EI / 2 l0``. The left side is the tension that the bending alone needs,
+so contacts take up the rest, ``Σ F_j·x_j' = k T_bend − T``, k being the rigidity over its nominal value. Which points
+touch, the direction of the forces and how several share them are knowledge of the model: the nominal robot's
+equilibrium at the displacement that the encoder reads. One factor on its forces is unknown.
+
+The two estimates differ in the shape at which the motion is taken. ``contact`` takes the free robot at the same
+displacement, which is right at small deflection; ``shape`` takes the measured shape and is right at any.
+
+Everything works on one robot or on arrays of them (...), with cables along an axis c, so that robots of several cables
+can share the formula. k is learnt before contact, see :class:`RigidityFit`.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from solver.common.geometry import subdivide
+from solver.common.validation import LARGEST, check_array, check_finite, check_instance, check_positive
+from solver.planar.equilibrium import Equilibrium
+from solver.planar.robot import Robot
+
+NEWTON_ITERATIONS = 5  # for the free robot's angle; the start is off by the square of the angle
+SPREAD = math.log(3)  # standard deviation of k around 1 before anything is measured
+LEAST_SLOPE = 0.02  # of a contact's motion against its force, over L/a; below, a pull hardly presses on it
+
+
+class Motion(NamedTuple):
+    """A shape, and a motion from it in which the cables take up dl.
+
+    Attributes:
+        nodes: Node poses, ``(..., n+1, 3)`` [mm, mm, rad].
+        slopes: Their slopes in the displacement of each cable, ``(..., c, n+1, 3)`` [mm, mm, rad per mm].
+        tensions: Tension that the bending alone needs in each cable, at nominal rigidity, ``(..., c)`` [N].
+    """
+
+    nodes: np.ndarray
+    slopes: np.ndarray
+    tensions: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class RigidityFit:
+    """Rigidity over its nominal value k, by least squares over the free phase with a ridge to 1.
+
+    It is the state of an episode: :meth:`updated` returns the next, and leaves it as it is where anything touches.
+    Where the tension is measured at the motor, k is the rigidity ratio over the share of the load that arrives.
+
+    Attributes:
+        products: Sum of products of measured and free tension over their variance, and the ridge's, ``(...)``.
+        squares: Sum of squares of the free tension, likewise, ``(...)``.
+    """
+
+    products: np.ndarray
+    squares: np.ndarray
+
+    @classmethod
+    def prior(cls, *shape: int) -> Self:
+        """Return the state before anything is measured, k = 1, of robots in an array of a shape."""
+        weight = np.full(shape, SPREAD**-2)
+        return cls(weight, weight)
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Rigidity over its nominal value k, ``(...)``."""
+        return np.asarray(self.products / self.squares)
+
+    def updated(
+        self, tensions: np.ndarray, free_tensions: np.ndarray, touching: np.ndarray, tension_noise_n: float
+    ) -> Self:
+        """Return the state after a measurement.
+
+        Args:
+            tensions: Measured tensions, ``(..., c)`` [N].
+            free_tensions: Those of the free nominal robot at the same displacements, ``(..., c)`` [N].
+            touching: Whether anything touches, ``(...)`` bool.
+            tension_noise_n: Standard deviation of the measured tension [N].
+
+        Raises:
+            ValueError: If the noise is not positive.
+        """
+        weight = np.where(touching, 0.0, check_positive("tension_noise_n", tension_noise_n) ** -2)
+        products, squares = (np.sum(other * free_tensions, axis=-1) for other in (tensions, free_tensions))
+        return type(self)(self.products + weight * products, self.squares + weight * squares)
+
+
+def contact_estimate(nominal: Equilibrium, tension: float, rigidity_ratio: float = 1.0) -> np.ndarray:
+    """Estimate the contact force from tension and displacement of the cable, ``(m, 2)`` [N].
+
+    Args:
+        nominal: Equilibrium of the nominal robot in the known scene at the measured displacement.
+        tension: Measured cable tension [N].
+        rigidity_ratio: Rigidity over its nominal value k, as :attr:`RigidityFit.ratio`.
+
+    Raises:
+        ValueError: If tension or ratio is not a finite number, or the ratio is not positive.
+        TypeError: If ``nominal`` is not an equilibrium of the plane.
+    """
+    check_instance("nominal", nominal, Equilibrium, "take one of a solver of the plane")
+    return _estimate(nominal, free_motion(nominal.robot, *_cable_and_length(nominal)), tension, rigidity_ratio)
+
+
+def shape_estimate(nominal: Equilibrium, nodes: np.ndarray, tension: float, rigidity_ratio: float = 1.0) -> np.ndarray:
+    """Estimate the contact force from the cable's tension and the measured shape, ``(m, 2)`` [N].
+
+    Args:
+        nominal: Equilibrium of the nominal robot in the known scene at the measured displacement.
+        nodes: Measured node poses, ``(n+1, 3)`` [mm, mm, rad].
+        tension: Measured cable tension [N].
+        rigidity_ratio: Rigidity over its nominal value k, as :attr:`RigidityFit.ratio`.
+
+    Raises:
+        ValueError: As :func:`contact_estimate`, or if the poses are not finite or not those of this robot's nodes.
+        TypeError: As :func:`contact_estimate`.
+    """
+    check_instance("nominal", nominal, Equilibrium, "take one of a solver of the plane")
+    nodes = check_array("nodes", nodes, nominal.nodes.shape, -LARGEST, LARGEST, "finite")
+    motion = shape_motion(nominal.robot, nodes, *_cable_and_length(nominal))
+    return _estimate(nominal, motion, tension, rigidity_ratio)
+
+
+def _cable_and_length(nominal: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(nominal.cable_mm), np.array(nominal.length_mm)
+
+
+def _estimate(nominal: Equilibrium, motion: Motion, tension: float, rigidity_ratio: float) -> np.ndarray:
+    tensions = np.array([check_finite("tension", tension)])
+    ratio = np.array(check_positive("rigidity_ratio", rigidity_ratio))
+    factor = force_factor(nominal.robot, motion, point_forces(nominal), tensions, ratio)
+    return np.asarray(factor * nominal.forces)
+
+
+def point_forces(equilibrium: Equilibrium) -> np.ndarray:
+    """Return the force of each obstacle on each point of the robot, by energy, ``(m, p, k, 2)`` [N]."""
+    multipliers, points = equilibrium.multipliers, equilibrium.points
+    forces = np.zeros((*multipliers.shape, 2))
+    for touch in np.argwhere(equilibrium.contact):
+        obstacle, line, position = touch
+        at = points[line, position] - equilibrium.displacements[obstacle]
+        normal = equilibrium.scene.obstacles[obstacle].normal_at(at)
+        forces[tuple(touch)] = equilibrium.energy_scale * multipliers[tuple(touch)] * normal
+    return forces
+
+
+def force_factor(
+    robot: Robot, motion: Motion, forces: np.ndarray, tensions: np.ndarray, rigidity_ratio: np.ndarray
+) -> np.ndarray:
+    """Return the factor on the nominal forces for which they do the work that the cables lack, ``(...)``.
+
+    With ``g_i`` the work of the nominal forces against the motion by cable i, it is
+    ``Σ g_i (T_i − k T_bend,i) / Σ g_i²``, by least squares; at least 0, as obstacles push. The denominator has a floor,
+    so that it is small where the motion hardly works against any contact.
+
+    Args:
+        robot: The robot.
+        motion: Shape and motion, of :func:`free_motion` or :func:`shape_motion`.
+        forces: Nominal force of each obstacle on each point, ``(..., m, p, k, 2)`` [N], as :func:`point_forces`.
+        tensions: Measured tensions, ``(..., c)`` [N].
+        rigidity_ratio: Rigidity over its nominal value k, ``(...)``.
+    """
+    slopes = point_slopes(robot, motion)
+    pressed = forces.sum(axis=-4)
+    works = -np.sum(pressed[..., None, :, :, :] * slopes, axis=(-3, -2, -1))
+    total = np.sqrt(np.sum(forces**2, axis=-1)).sum(axis=(-3, -2, -1))
+    least = LEAST_SLOPE * robot.longest_mm / robot.offset_mm * total
+    lacking = tensions - rigidity_ratio[..., None] * motion.tensions
+    squares = np.maximum(np.sum(works**2, axis=-1), least**2)
+    return np.asarray(np.maximum(np.sum(works * lacking, axis=-1), 0.0) / np.where(squares > 0, squares, 1.0))
+
+
+def point_slopes(robot: Robot, motion: Motion) -> np.ndarray:
+    """Return the slopes of the points that can touch, ``(..., c, p, k, 2)`` [mm per mm]."""
+    angles, slopes = motion.nodes[..., None, :, 2], motion.slopes
+    turned = slopes[..., 2, None] * np.stack([-np.sin(angles), np.cos(angles)], axis=-1)
+    lines = slopes[..., None, :, :2] + np.array(robot.lines_mm)[:, None, None] * turned[..., None, :, :]
+    return subdivide(lines, robot.between)
+
+
+def free_motion(robot: Robot, cable_mm: np.ndarray, length_mm: np.ndarray) -> Motion:
+    """Return pose, slopes and tension of the free robot at cable displacements and lengths ``(...)`` [mm]."""
+    cable_mm, length_mm = np.asarray(cable_mm), np.asarray(length_mm)
+    angle, chord = _free_segment(robot, cable_mm / robot.segments, length_mm / robot.segments)
+    middles = (np.arange(robot.segments) + 0.5) * angle[..., None]
+    nodes = np.zeros((*angle.shape, robot.segments + 1, 3))
+    nodes[..., 1:, 0] = chord[..., None] * np.cumsum(np.sin(middles), axis=-1)
+    nodes[..., 1:, 1] = chord[..., None] * np.cumsum(np.cos(middles), axis=-1)
+    nodes[..., 2] = -angle[..., None] * np.arange(robot.segments + 1)
+    return shape_motion(robot, nodes, cable_mm, length_mm)
+
+
+def shape_motion(robot: Robot, nodes: np.ndarray, cable_mm: np.ndarray, length_mm: np.ndarray) -> Motion:
+    """Return the motion from a shape in which every segment takes up the cable alike, and the tension that it needs.
+
+    A rod's segments all turn by the same angle. Those of the paper's model take an equal share at constant shear.
+
+    Args:
+        robot: The robot.
+        nodes: Node poses, ``(..., n+1, 3)`` [mm, mm, rad].
+        cable_mm: Cable displacements, ``(...)`` [mm].
+        length_mm: Lengths of the backbone, ``(...)`` [mm].
+    """
+    ahead, angles = np.diff(nodes[..., :2], axis=-2), -np.diff(nodes[..., 2], axis=-1)
+    length, pull = np.asarray(length_mm)[..., None] / robot.segments, np.asarray(cable_mm)[..., None] / robot.segments
+    if robot.model == "rod":
+        stretch = _sinc_slope(angles / 2) / (2 * np.sinc(angles / (2 * np.pi)))  # c'/c, of the chord in the angle
+        taken = robot.offset_mm * np.cos(angles / 2) - length * _sinc_slope(angles / 2) / 2
+        turns = np.broadcast_to(1 / taken.sum(axis=-1, keepdims=True), angles.shape)
+    else:
+        bisector = nodes[..., :-1, 2] - angles / 2
+        reach = ahead[..., 1] * np.cos(bisector) - ahead[..., 0] * np.sin(bisector)
+        cable = reach - 2 * robot.offset_mm * np.sin(angles / 2)  # across the bisector of the disks
+        stretch = np.zeros_like(angles)
+        turns = (length - pull) / (robot.segments * robot.offset_mm * np.cos(angles / 2) * cable)
+    energy_scale = robot.rigidity / (2 * length[..., 0])
+    tensions = 2 * energy_scale * np.sum(angles * turns, axis=-1)
+    return Motion(nodes, _node_slopes(ahead, stretch * turns, turns)[..., None, :, :], tensions[..., None])
+
+
+def _node_slopes(ahead: np.ndarray, stretch: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Return the slopes of node poses whose segments stretch and whose disks turn against each other."""
+    slopes = np.zeros((*turns.shape[:-1], turns.shape[-1] + 1, 3))
+    slopes[..., 1:, 2] = -np.cumsum(turns, axis=-1)
+    turning = slopes[..., :-1, 2] - turns / 2  # of a segment, which turns with the bisector of its disks
+    slopes[..., 1:, 0] = np.cumsum(stretch * ahead[..., 0] - turning * ahead[..., 1], axis=-1)
+    slopes[..., 1:, 1] = np.cumsum(stretch * ahead[..., 1] + turning * ahead[..., 0], axis=-1)
+    return slopes
+
+
+def _free_segment(robot: Robot, pull: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return angle [rad] and chord [mm] of the free robot's segments, which all are alike, for arrays of them."""
+    offset = robot.offset_mm
+    if robot.model == "paper":
+        return 2 * np.arcsin(pull / (2 * offset)), np.asarray(length)
+    half = pull / (2 * offset)
+    for _ in range(NEWTON_ITERATIONS):
+        taken = length * (1 - np.sinc(half / np.pi)) + 2 * offset * np.sin(half)
+        half = half - (taken - pull) / (2 * offset * np.cos(half) - length * _sinc_slope(half))
+    return 2 * half, length * np.sinc(half / np.pi)
+
+
+def _sinc_slope(half: np.ndarray) -> np.ndarray:
+    """Return the derivative of sin h / h."""
+    return np.asarray((np.cos(half) - np.sinc(half / np.pi)) / np.where(half == 0, 1.0, half))
