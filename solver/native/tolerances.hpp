@@ -100,6 +100,7 @@ inline constexpr double kBarrierCurvature = 10.0;  // curvature of the barrier [
 inline constexpr int kDescentIterations = 300;
 inline constexpr int kFinishEvery = 8;       // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;  // largest step of one iterate
+inline constexpr double kDisturbance = 1e-6;  // of the slopes of the energy at a saddle [rad²]
 inline constexpr double kSmallestPart =
     1e-3;  // smallest first step of a descent, as a fraction of the sub-step that ended the branch
 inline constexpr double kCreep = 1e-4;                // size of an iterate that hardly moves

@@ -84,12 +84,12 @@ def command(spec: Spec, pulls: np.ndarray) -> Any:
 
 
 def follow(spec: Spec, pulls: Iterator[np.ndarray] | list[np.ndarray]) -> Iterator[Any]:
-    """Yield the package's equilibria along pulls, from rest on; each step must converge."""
+    """Yield the package's equilibria along pulls, from rest on; each step must reach its command."""
     robot = make_solver(spec)
     equilibrium = robot.rest()
     for target in pulls:
         equilibrium = robot.step(equilibrium, command(spec, target))
-        assert equilibrium.status is solver.Status.CONVERGED, (equilibrium, target)
+        assert equilibrium.status in (solver.Status.CONVERGED, solver.Status.SNAPPED), (equilibrium, target)
         yield equilibrium
 
 

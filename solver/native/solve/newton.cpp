@@ -265,8 +265,10 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
   problem.reduced_gradient(at.active);
-  result.converged = is_equilibrium(at.active) && factor_stable(at.active, kPenalties);
+  const bool stationary = is_equilibrium(at.active);
+  result.converged = stationary && factor_stable(at.active, kPenalties);
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
+  if (stationary) problem.disturb_gradient();  // a saddle, as a symmetric robot reaches: leave it to either side
   ActiveSet target = at.active;
   if (!qp_.solve(problem, kkt_, target, step_)) {  // not stable without a gap that it drops
     target = at.active;
