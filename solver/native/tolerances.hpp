@@ -71,8 +71,7 @@ inline constexpr double kUnevenTension = 0.001;  // the same, as a fraction of t
 inline constexpr double kReturned = 1e-3;  // deviation from the start after the way back, as a fraction of the motion
 inline constexpr int kWork = 4500;         // budget of factorisations of a step
 inline constexpr int kPollPoints = 20000;  // points moved by sub-steps and iterates between polls for an interruption
-inline constexpr int kSubSteps = 400;      // budget of sub-steps, beside twice those of the largest size
-inline constexpr int kBranchEnds = 24;     // budget of branch ends of a step
+inline constexpr int kSubSteps = kWork;    // budget of sub-steps: one that needs Newton's method factors at least once
 
 // Sweep: allowed depth of a point's straight path in an obstacle, over the radius of the largest ball inside it.
 inline constexpr double kSweepDepth = 0.01;
@@ -110,5 +109,10 @@ inline constexpr int kDescentBacktracks = 12;
 inline constexpr int kRestorations = 8;
 inline constexpr double kDescentMove = 0.0225;  // largest motion of a point in one iterate [L]
 inline constexpr int kDescentShortenings = 4;   // of an iterate that moved farther, or through an obstacle
+inline constexpr double kProgress =
+    1e-3;  // least motion of an iterate after its restoration, over that before it
+inline constexpr int kFlat = 8;             // iterates that lose no energy, after which a saddle is suspected
+inline constexpr int kSofteningRounds = 16;  // of inverse iteration for the direction of least curvature
+inline constexpr int kSaddleTries = 10;      // steps along it, each a quarter of the last
 
 }  // namespace ccr::tolerances

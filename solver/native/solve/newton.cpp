@@ -43,12 +43,12 @@ bool Newton<Model>::is_equilibrium(const ActiveSet& active) const {
 }
 
 // Factors the exact Hessian; where that fails, with a growing penalty on the active gaps, which leaves the solution
-// unchanged and succeeds if H is positive definite on their tangent space. A rod needs no penalty: whether H is
-// positive definite there is read off its inertia.
+// unchanged and succeeds if H is positive definite on their tangent space. Where the inertia is counted, no penalty is
+// needed: whether H is positive definite there is read off it.
 template <class Model>
 bool Newton<Model>::factor_penalized(const ActiveSet& active, int penalties) {
   damping_ = 0;
-  if (Model::kRod) {
+  if (kkt_.counts_inertia) {
     kkt_.assemble(problem, active, 0);
     return kkt_.factor(0);
   }
@@ -221,6 +221,8 @@ bool Newton<Model>::set_metric(const Iterate& at) {
   needed_damping_ = 0;
   stretch_ = kStretch;
   creeping_ = false;
+  lowest_ = HUGE_VAL;
+  flat_ = 0;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
   return factor_convexified(at.active, kDescentPenalties) && factor_metric();
@@ -267,22 +269,27 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   problem.reduced_gradient(at.active);
   result.converged = is_equilibrium(at.active) && factor_stable(at.active, kPenalties);
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
+  if (is_flat(at.active) && damping_ > 0) {
+    if (!kkt_.counts_inertia) {
+      kkt_.counts_inertia = true;
+      needed_damping_ = 0;
+    } else {
+      result.moved = leave_saddle(at, largest);
+    }
+    if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;
+  }
   ActiveSet target = at.active;
   if (!qp_.solve(problem, kkt_, target, step_)) {  // not stable without a gap that it drops
     target = at.active;
-    if (!Model::kRod || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
+    if (!kkt_.counts_inertia || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
   }
-  // Closing gaps that are open within the tolerance may cost energy: λ times the gap.
-  const double before = problem.energy();
-  double allowed = before + kEnergyRoundoff * before;
-  for (int j = 0; j < target.count; ++j)
-    allowed += 2 * kDescentFeasibility * problem.robot().max_length * target.multiplier[j];
-  const double whole = std::min(1.0, largest / step_size(step_));
+  const double allowed = problem.energy() + rise_of_roundoff(target);
+  const double size = step_size(step_), whole = std::min(1.0, largest / size);
   trial_.command = at.command;
   const ActiveSet touching = closed_contacts(target);
   // Where H is not positive definite, the energy keeps falling beyond the end of a damped step.
   const bool stretched = damping_ > 0 && touching.count == target.count;
-  const double farthest = stretched ? std::min(stretch_, largest / step_size(step_)) : whole;
+  const double farthest = stretched ? std::min(stretch_, largest / size) : whole;
   double scale = farthest;
   // The norm of restorations: near a fold the energy hardly resists the motion that ends the branch, so damping is
   // added.
@@ -291,13 +298,14 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap with a multiplier
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
-    if (problem.energy() > allowed) continue;
+    // A step beyond a corner may be restored to where it began.
+    if (problem.energy() > allowed || !has_moved(at, kProgress * scale * size)) continue;
     std::swap(at.controls, trial_.controls);
     std::swap(at.mounts, trial_.mounts);
     at.active = closed_contacts(target);
     result.moved = true;
     // Heavily damped steps are too short far from the end of a descent; near it a stronger penalty instead is harmless.
-    creeping_ = !creeping_ && scale * step_size(step_) < kCreep;
+    creeping_ = !creeping_ && scale * size < kCreep;
     if (stretched) stretch_ = scale == farthest ? kStretch * scale : std::max(kStretch, scale);
     return result;
   }

@@ -27,6 +27,9 @@ class Newton {
   // positive definite on the tangent space of the active gaps, but for the first `damped` iterations, which are damped.
   NewtonResult solve(Iterate& at, int damped);
 
+  // Forgets that the last step had to count the inertia of H.
+  void begin_step() { kkt_.counts_inertia = Model::kRod; }
+
   // One iterate of a feasible descent. Where `at` is an equilibrium, returns `converged`; otherwise moves `at` to a
   // feasible shape of no more energy, by a step of at most the size `largest`, and returns whether it `moved`.
   NewtonResult descend_once(Iterate& at, double largest);
@@ -52,6 +55,10 @@ class Newton {
   bool factor_definite();
   bool factor_metric();
   double step_size(const Direction<Model>& step) const;
+  double rise_of_roundoff(const ActiveSet& active) const;
+  bool has_moved(const Iterate& from, double least) const;
+  bool is_flat(const ActiveSet& active);
+  bool leave_saddle(Iterate& at, double largest);
   double merit(double weight) const;
   double line_search(const Iterate& at, const ActiveSet& target, double& weight);
 
@@ -64,6 +71,8 @@ class Newton {
   double needed_damping_ = 0;  // damping that was needed last in this descent
   double stretch_ = 1;         // of the next damped iterate of this descent
   bool creeping_ = false;      // whether the iterates of this descent hardly move
+  double lowest_ = 0;          // energy of this descent when it fell last
+  int flat_ = 0;               // iterates since then
 };
 
 }  // namespace ccr
