@@ -48,6 +48,7 @@ inline constexpr int kDescentPenalties = 2;  // while a descent moves; kPenaltie
 inline constexpr double kDamping = 1e-8;
 inline constexpr double kDampingGrowth = 8.0;
 inline constexpr int kDampingTries = 24;
+inline constexpr int kPenaltyWork = 1000;  // factorisations of a step, after which it counts the inertia instead
 inline constexpr double kNormDamping = 1.0;  // of the norm that measures closeness of shapes
 
 // Continuation.

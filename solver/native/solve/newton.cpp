@@ -42,6 +42,13 @@ bool Newton<Model>::is_equilibrium(const ActiveSet& active) const {
   return worst <= problem.stationarity_tolerance(active) && gaps_closed(active, kFeasibility);
 }
 
+// Where contacts hold a robot of the paper's models far from its free shape, no penalty may be strong enough: a step
+// that takes much work counts the inertia instead.
+template <class Model>
+void Newton<Model>::choose_test() {
+  kkt_.counts_inertia = Model::kRod || factorizations() - factorizations_before_ > kPenaltyWork;
+}
+
 // Factors the exact Hessian; where that fails, with a growing penalty on the active gaps, which leaves the solution
 // unchanged and succeeds if H is positive definite on their tangent space. Where the inertia is counted, no penalty is
 // needed: whether H is positive definite there is read off it.
@@ -177,6 +184,7 @@ template <class Model>
 NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
+  choose_test();
   double weight = 0;
   bool close = false, stable = true;  // whether the last H was positive definite on their tangent space
   needed_damping_ = 0;
@@ -266,20 +274,18 @@ template <class Model>
 NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
+  choose_test();
   problem.reduced_gradient(at.active);
   result.converged = is_equilibrium(at.active) && factor_stable(at.active, kPenalties);
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
-  if (is_flat(at.active) && damping_ > 0) {
-    if (!kkt_.counts_inertia) {
-      kkt_.counts_inertia = true;
-      needed_damping_ = 0;
-    } else {
-      result.moved = leave_saddle(at, largest);
-    }
+  const bool flat = is_flat(at.active);
+  if (flat && damping_ > 0) {
+    result.moved = leave_saddle(at, largest);
     if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;
   }
   ActiveSet target = at.active;
-  if (!qp_.solve(problem, kkt_, target, step_)) {  // not stable without a gap that it drops
+  if (!qp_.solve(problem, kkt_, target, step_) &&
+      !(flat && release_lowest(at, target))) {  // not stable without a gap that it drops
     target = at.active;
     if (!kkt_.counts_inertia || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
   }

@@ -27,8 +27,8 @@ class Newton {
   // positive definite on the tangent space of the active gaps, but for the first `damped` iterations, which are damped.
   NewtonResult solve(Iterate& at, int damped);
 
-  // Forgets that the last step had to count the inertia of H.
-  void begin_step() { kkt_.counts_inertia = Model::kRod; }
+  // Begins to count the work of a step.
+  void begin_step() { factorizations_before_ = factorizations(); }
 
   // One iterate of a feasible descent. Where `at` is an equilibrium, returns `converged`; otherwise moves `at` to a
   // feasible shape of no more energy, by a step of at most the size `largest`, and returns whether it `moved`.
@@ -48,6 +48,8 @@ class Newton {
   bool is_equilibrium(const ActiveSet& active) const;
   ActiveSet closed_contacts(const ActiveSet& active) const;
   bool gaps_closed(const ActiveSet& active, double tolerance) const;
+  void choose_test();
+  bool release_lowest(Iterate& at, ActiveSet& target);
   bool factor_penalized(const ActiveSet& active, int penalties);
   bool factor_stable(const ActiveSet& active, int penalties);
   bool factor_convexified(const ActiveSet& active, int penalties);
@@ -66,6 +68,7 @@ class Newton {
   ActiveSetQp<Model> qp_;
   Direction<Model> step_, correction_;
   double step_size_ = 0;  // of `step_`
+  std::int64_t factorizations_before_ = 0;  // of the step
   Iterate trial_;
   double damping_ = 0;
   double needed_damping_ = 0;  // damping that was needed last in this descent

@@ -60,6 +60,7 @@ bool Newton<Model>::is_flat(const ActiveSet& active) {
 template <class Model>
 bool Newton<Model>::leave_saddle(Iterate& at, double largest) {
   flat_ = 0;
+  if (!kkt_.counts_inertia) return false;
   needed_damping_ = 0;
   if (factor_stable(at.active, kDescentPenalties) || !factor_damped(at.active)) return false;
   for (std::size_t i = 0; i < correction_.controls.size(); ++i)
@@ -81,11 +82,26 @@ bool Newton<Model>::leave_saddle(Iterate& at, double largest) {
   return false;
 }
 
+// Solves for the step without the active gap that is pressed least, with only the damping that its absence needs.
+template <class Model>
+bool Newton<Model>::release_lowest(Iterate& at, ActiveSet& target) {
+  target = at.active;
+  if (target.count == 0) return false;
+  const auto begin = target.multiplier.begin();
+  target.drop(static_cast<int>(std::min_element(begin, begin + target.count) - begin));
+  problem.reduced_gradient(target);
+  needed_damping_ = 0;
+  const bool solved = factor_convexified(target, kDescentPenalties) && qp_.solve(problem, kkt_, target, step_);
+  if (!solved) problem.reduced_gradient(at.active);
+  return solved;
+}
+
 #define CCR_INSTANTIATE(Model)                                                \
   template double Newton<Model>::rise_of_roundoff(const ActiveSet&) const;    \
   template bool Newton<Model>::has_moved(const Iterate&, double) const;       \
   template bool Newton<Model>::is_flat(const ActiveSet&);                     \
-  template bool Newton<Model>::leave_saddle(Iterate&, double);
+  template bool Newton<Model>::leave_saddle(Iterate&, double);                \
+  template bool Newton<Model>::release_lowest(Iterate&, ActiveSet&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 
