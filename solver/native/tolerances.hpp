@@ -48,7 +48,7 @@ inline constexpr int kDescentPenalties = 2;  // while a descent moves; kPenaltie
 inline constexpr double kDamping = 1e-8;
 inline constexpr double kDampingGrowth = 8.0;
 inline constexpr int kDampingTries = 24;
-inline constexpr int kPenaltyWork = 1000;  // factorisations of a step, after which it counts the inertia instead
+inline constexpr int kPenaltyWork = 1200;    // factorisations of a step, after which it counts the inertia instead
 inline constexpr double kNormDamping = 1.0;  // of the norm that measures closeness of shapes
 
 // Continuation.
@@ -110,10 +110,9 @@ inline constexpr int kDescentBacktracks = 12;
 inline constexpr int kRestorations = 8;
 inline constexpr double kDescentMove = 0.0225;  // largest motion of a point in one iterate [L]
 inline constexpr int kDescentShortenings = 4;   // of an iterate that moved farther, or through an obstacle
-inline constexpr double kProgress =
-    1e-3;  // least motion of an iterate after its restoration, over that before it
-inline constexpr int kFlat = 8;             // iterates that lose no energy, after which a saddle is suspected
-inline constexpr int kSofteningRounds = 16;  // of inverse iteration for the direction of least curvature
-inline constexpr int kSaddleTries = 10;      // steps along it, each a quarter of the last
+inline constexpr double kProgress = 1e-3;       // least motion of an iterate after its restoration, over that before it
+inline constexpr int kFlat = 8;                 // iterates that lose no energy, after which a saddle is suspected
+inline constexpr int kSofteningRounds = 16;     // of inverse iteration for the direction of least curvature
+inline constexpr int kSaddleTries = 10;         // steps along it, each a quarter of the last
 
 }  // namespace ccr::tolerances

@@ -16,6 +16,7 @@ Spatial::Spatial(const Robot& robot)
       adjoints_(SpatialLaw::kAdjoint, robot.segments),
       hessians_(SpatialLaw::kHessian, robot.segments),
       bends_(robot.segments),
+      chords_(robot.segments),
       forces_(robot.segments),
       moments_(robot.segments) {}
 
@@ -41,9 +42,8 @@ bool Spatial::evaluate(const Command<2>& command, const std::vector<Control>& co
   for (int i = 0; i < n; ++i) {
     Bend& bend = bends_[i];
     laws_.get(i, bend.chord.v.data(), SpatialLaw::kBend);
-    const Vec<3> chord = times(frames[i], bend.chord);
-    states[i + 1] = states[i];
-    for (int k = 0; k < 3; ++k) states[i + 1][k] += chord[k];
+    const Vec<3> chord = chords_[i] = times(frames[i], bend.chord);
+    for (int k = 0; k < 3; ++k) states[i + 1][k] = states[i][k] + chord[k];  // turns of the disks are 0 throughout
     frames[i + 1] = times(frames[i], bend.rotation);
     objective += bend.objective;
     for (const double slope : bend.objective_slope.v)
@@ -67,7 +67,7 @@ void Spatial::propagate_adjoints(const std::vector<State>& node_forces) {
     gradient[i] = bend.objective_slope;
     gradient[i] += transpose_times(bend.chord_slope, forces_[i]);
     gradient[i] += transpose_times(bend.turn_slope, moments_[i]);
-    moment += cross(times(frames[i], bend.chord), force);
+    moment += cross(chords_[i], force);
   }
 }
 
@@ -77,7 +77,7 @@ void Spatial::lagrangian_hessian(System& system) const {
     const Bend& bend = bends_[i];
     const Frame& frame = frames[i];
     System::Stage& stage = system.stages[i];
-    stage.a.chord = times(frame, bend.chord);
+    stage.a.chord = chords_[i];
     const Mat<3, 3> chord_slope = times(frame, bend.chord_slope), turn_slope = times(frame, bend.turn_slope);
     const Vec<3> force = times(frame, forces_[i]), moment = times(frame, moments_[i]);
     const Mat<3, 3> turned = hessian_contraction(stage.a.chord, force);

@@ -108,6 +108,7 @@ class Spatial {
   Rows controls_, bendings_, laws_, adjoints_;
   mutable Rows hessians_;
   std::vector<Bend> bends_;
+  std::vector<Vec<3>> chords_;  // of the segments, in the frame of the base
   std::vector<Vec<3>> forces_, moments_;  // adjoints of the upper state of each segment, in its lower disk's frame
 };
 

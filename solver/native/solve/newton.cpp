@@ -132,14 +132,6 @@ double Newton<Model>::merit(double weight) const {
 
 namespace {
 
-template <class Model>
-void advance(const Iterate<Model>& from, double scale, const Direction<Model>& step, Iterate<Model>& to) {
-  for (std::size_t i = 0; i < from.controls.size(); ++i)
-    for (int k = 0; k < Model::kControl; ++k) to.controls[i][k] = from.controls[i][k] + scale * step.controls[i][k];
-  for (std::size_t m = 0; m < from.mounts.size(); ++m)
-    for (int k = 0; k < Model::kSpace; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
-}
-
 // Interpolates multipliers from one active set to another, at a fraction of the step.
 void blend(const ActiveSet& from, double scale, ActiveSet& to) {
   if (scale == 1) return;

@@ -15,6 +15,15 @@ struct NewtonResult {
   bool moved = false;  // descent: whether another shape was reached
 };
 
+// Leaves in `to` a part of a step away from a shape.
+template <class Model>
+void advance(const Iterate<Model>& from, double scale, const Direction<Model>& step, Iterate<Model>& to) {
+  for (std::size_t i = 0; i < from.controls.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k) to.controls[i][k] = from.controls[i][k] + scale * step.controls[i][k];
+  for (std::size_t m = 0; m < from.mounts.size(); ++m)
+    for (int k = 0; k < Model::kSpace; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
+}
+
 template <class Model>
 class Newton {
  public:
@@ -67,7 +76,7 @@ class Newton {
   KktSystem<Model> kkt_;
   ActiveSetQp<Model> qp_;
   Direction<Model> step_, correction_;
-  double step_size_ = 0;  // of `step_`
+  double step_size_ = 0;                    // of `step_`
   std::int64_t factorizations_before_ = 0;  // of the step
   Iterate trial_;
   double damping_ = 0;

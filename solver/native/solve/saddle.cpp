@@ -9,18 +9,6 @@ namespace ccr {
 
 using namespace tolerances;
 
-namespace {
-
-template <class Model>
-void advance(const Iterate<Model>& from, double scale, const Direction<Model>& step, Iterate<Model>& to) {
-  for (std::size_t i = 0; i < from.controls.size(); ++i)
-    for (int k = 0; k < Model::kControl; ++k) to.controls[i][k] = from.controls[i][k] + scale * step.controls[i][k];
-  for (std::size_t m = 0; m < from.mounts.size(); ++m)
-    for (int k = 0; k < Model::kSpace; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
-}
-
-}  // namespace
-
 // Energy that closing gaps which are open within the tolerance may cost, λ times the gap, and roundoff.
 template <class Model>
 double Newton<Model>::rise_of_roundoff(const ActiveSet& active) const {
@@ -96,11 +84,11 @@ bool Newton<Model>::release_lowest(Iterate& at, ActiveSet& target) {
   return solved;
 }
 
-#define CCR_INSTANTIATE(Model)                                                \
-  template double Newton<Model>::rise_of_roundoff(const ActiveSet&) const;    \
-  template bool Newton<Model>::has_moved(const Iterate&, double) const;       \
-  template bool Newton<Model>::is_flat(const ActiveSet&);                     \
-  template bool Newton<Model>::leave_saddle(Iterate&, double);                \
+#define CCR_INSTANTIATE(Model)                                             \
+  template double Newton<Model>::rise_of_roundoff(const ActiveSet&) const; \
+  template bool Newton<Model>::has_moved(const Iterate&, double) const;    \
+  template bool Newton<Model>::is_flat(const ActiveSet&);                  \
+  template bool Newton<Model>::leave_saddle(Iterate&, double);             \
   template bool Newton<Model>::release_lowest(Iterate&, ActiveSet&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
