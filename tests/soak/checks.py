@@ -141,7 +141,7 @@ def _gave_up(solver, taken, tally):
 def _reason(solver, taken, k):
     """Return why a step was given up on.
 
-    ``folded``: the branch ends where a segment of the paper's models folds over. ``slack``: without pretension the
+    ``folded``: the branch ends, at once or after repeats, where a segment of the paper's models folds over. ``slack``: without pretension the
     shape of the paper's model is undetermined. ``crossing``: the pulled cable of a pair changes in contact, where the
     shape of the paper's model jumps. ``far``: the command exceeds the work of one step; each repeat comes nearer,
     until one ends with another status. ``pinched``: no repeat comes nearer any more, and obstacles squeeze the robot,
@@ -162,6 +162,8 @@ def _reason(solver, taken, k):
     state = _repeated(solver, state, command)
     if state.status != Status.GAVE_UP:
         return "far"
+    if _trace(solver, state, command).reason == "folded":
+        return "folded"
     return "pinched" if _is_pinched(state, command) else "unexplained"
 
 
