@@ -142,11 +142,12 @@ def _reason(solver, taken, k):
     """Return why a step was given up on.
 
     ``folded``: the branch ends, at once or after repeats, where a segment of the paper's models folds over.
-    ``slack``: without pretension the shape of the paper's model is undetermined. ``crossing``: the pulled cable of a
-    pair changes in contact, where the shape of the paper's model jumps. ``far``: the command exceeds the work of one step; each repeat comes nearer,
-    until one ends with another status. ``pinched``: no repeat comes nearer any more, and obstacles squeeze the robot,
-    with contact forces that no cable causes by pulling: the command feeds or draws it, or a cable of the paper's models
-    pushes it, into a place that is too narrow, and these models set no limit to that.
+    ``slack``: without pretension the shape of the paper's model is undetermined. ``crossing``: the pulled cable of
+    a pair changes in contact, where the shape of the paper's model jumps. ``far``: the command exceeds the work of
+    one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
+    more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
+    draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
+    limit to that.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = _trace(solver, taken.states[k], command).reason
