@@ -17,6 +17,9 @@ class Status(IntEnum):
     STALLED = 2
     """The cable tension reached the robot's limit, or would exceed it in a snap; the cable moved as far as the limit.
 
+    A step in space may end below the limit with this status, where its motors would be overloaded on the way;
+    the same command may then lead farther in a further step.
+
     Where a release ends in a snap to more tension than the motor holds, it yields: the cable goes farther than asked.
     """
     BLOCKED = 3

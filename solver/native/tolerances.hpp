@@ -48,6 +48,7 @@ inline constexpr int kDescentPenalties = 2;  // while a descent moves; kPenaltie
 inline constexpr double kDamping = 1e-8;
 inline constexpr double kDampingGrowth = 8.0;
 inline constexpr int kDampingTries = 24;
+inline constexpr int kPenaltyWork = 1200;    // factorisations of a step, after which it counts the inertia instead
 inline constexpr double kNormDamping = 1.0;  // of the norm that measures closeness of shapes
 
 // Continuation.
@@ -72,8 +73,7 @@ inline constexpr double kUnevenTension = 0.001;  // the same, as a fraction of t
 inline constexpr double kReturned = 1e-3;  // deviation from the start after the way back, as a fraction of the motion
 inline constexpr int kWork = 4500;         // budget of factorisations of a step
 inline constexpr int kPollPoints = 20000;  // points moved by sub-steps and iterates between polls for an interruption
-inline constexpr int kSubSteps = 400;      // budget of sub-steps, beside twice those of the largest size
-inline constexpr int kBranchEnds = 24;     // budget of branch ends of a step
+inline constexpr int kSubSteps = kWork;    // budget of sub-steps: one that needs Newton's method factors at least once
 
 // Sweep: allowed depth of a point's straight path in an obstacle, over the radius of the largest ball inside it.
 inline constexpr double kSweepDepth = 0.01;
@@ -100,7 +100,6 @@ inline constexpr double kBarrierCurvature = 10.0;  // curvature of the barrier [
 inline constexpr int kDescentIterations = 300;
 inline constexpr int kFinishEvery = 8;       // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;  // largest step of one iterate
-inline constexpr double kDisturbance = 1e-6;  // of the slopes of the energy at a saddle [rad²]
 inline constexpr double kSmallestPart =
     1e-3;  // smallest first step of a descent, as a fraction of the sub-step that ended the branch
 inline constexpr double kCreep = 1e-4;                // size of an iterate that hardly moves
@@ -112,5 +111,9 @@ inline constexpr int kDescentBacktracks = 12;
 inline constexpr int kRestorations = 8;
 inline constexpr double kDescentMove = 0.0225;  // largest motion of a point in one iterate [L]
 inline constexpr int kDescentShortenings = 4;   // of an iterate that moved farther, or through an obstacle
+inline constexpr double kProgress = 1e-3;       // least motion of an iterate after its restoration, over that before it
+inline constexpr int kFlat = 8;                 // iterates that lose no energy, after which a saddle is suspected
+inline constexpr int kSofteningRounds = 16;     // of inverse iteration for the direction of least curvature
+inline constexpr int kSaddleTries = 10;         // steps along it, each a quarter of the last
 
 }  // namespace ccr::tolerances

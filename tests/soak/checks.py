@@ -21,7 +21,9 @@ ROUNDOFF = 1e-12
 BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
 PRETENSION = 0.00625 * 1.001  # of the offset: a cable displaced less is practically slack
-REPEATS = 10  # of a command that was given up on
+REPEATS = 300  # of a command that was given up on, each of which must come nearer
+PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
+UNPULLED = 10  # contact force over the tension: beyond what the cables can cause
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
 
 
@@ -139,10 +141,13 @@ def _gave_up(solver, taken, tally):
 def _reason(solver, taken, k):
     """Return why a step was given up on.
 
-    ``folded``: the branch ends where a segment of the paper's models folds over. ``slack``: without pretension the
-    shape of the paper's model is undetermined. ``crossing``: the pulled cable of a pair changes in contact, where the
-    shape of the paper's model jumps. ``far``: the command exceeds the work budget of one step, and repeating it leads
-    there or to another status.
+    ``folded``: the branch ends, at once or after repeats, where a segment of the paper's models folds over.
+    ``slack``: without pretension the shape of the paper's model is undetermined. ``crossing``: the pulled cable of
+    a pair changes in contact, where the shape of the paper's model jumps. ``far``: the command exceeds the work of
+    one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
+    more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
+    draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
+    limit to that.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = _trace(solver, taken.states[k], command).reason
@@ -155,11 +160,35 @@ def _reason(solver, taken, k):
             return "slack"
     elif np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"
+    state = _repeated(solver, state, command)
+    if state.status != Status.GAVE_UP:
+        return "far"
+    if _trace(solver, state, command).reason == "folded":
+        return "folded"
+    return "pinched" if _is_pinched(state, command) else "unexplained"
+
+
+def _repeated(solver, state, command):
+    """Return where a command leads that is repeated as long as it comes nearer."""
     for _ in range(REPEATS):
-        state = step(solver, state, command)
-        if state.status != Status.GAVE_UP:
-            return "far"
-    return "unexplained"
+        before, state = state, step(solver, state, command)
+        if state.status != Status.GAVE_UP or not _distance(state, command) < _distance(before, command):
+            break
+    return state
+
+
+def _distance(state, command):
+    robot = state.robot
+    scale = np.array([*(robot.offset_mm for _ in command[:-1]), robot.length_mm])
+    return np.max(np.abs(command_of(state) - command) / scale)
+
+
+def _is_pinched(state, command):
+    """Return whether contact forces that the pull of the cables cannot cause squeeze a robot."""
+    force = np.linalg.norm(state.forces, axis=-1).max(initial=0)
+    pull, fed = np.max(_tensions(state)), state.length_mm != command[-1]
+    bending = state.robot.rigidity / state.length_mm**2
+    return (fed or pull < 0) and force > PINCHED * bending and force > UNPULLED * pull
 
 
 def _blocked(solver, taken, tally):

@@ -48,13 +48,13 @@ inline Vec<3> disk_lever(const Mat<3, 3>& frame, const Vec<2>& place) {
   return lever;
 }
 
-// State and frame of the upper disk of a segment.
+// Finds state and frame of the upper disk of a segment. Returns its chord in the base frame.
 template <class Bend>
-void move_up(const Bend& bend, const Vec<6>& state, const Mat<3, 3>& frame, Vec<6>& next, Mat<3, 3>& next_frame) {
+Vec<3> move_up(const Bend& bend, const Vec<6>& state, const Mat<3, 3>& frame, Vec<6>& next, Mat<3, 3>& next_frame) {
   const Vec<3> chord = times(frame, bend.chord);
-  next = state;
-  for (int k = 0; k < 3; ++k) next[k] += chord[k];
+  for (int k = 0; k < 3; ++k) next[k] = state[k] + chord[k];  // the turns are 0 throughout
   next_frame = times(frame, bend.rotation);
+  return chord;
 }
 
 // Adjoint of a state, in the base frame.
@@ -73,9 +73,9 @@ struct Wrench {
 // Blocks of the Hessian of a segment in its lower state, and between that and the controls, from the adjoint of its
 // upper state in the lower disk's frame.
 template <class Bend, class Stage>
-void assemble_stage(const Bend& bend, const Mat<3, 3>& frame, const Wrench& local, Stage& stage,
+void assemble_stage(const Bend& bend, const Vec<3>& chord, const Mat<3, 3>& frame, const Wrench& local, Stage& stage,
                     Mat<6, 6>& node_hessian) {
-  stage.a.chord = times(frame, bend.chord);
+  stage.a.chord = chord;
   const Mat<3, 3> chord_slope = times(frame, bend.chord_slope), turn_slope = times(frame, bend.turn_slope);
   const Vec<3> force = times(frame, local.force), moment = times(frame, local.moment);
   const Mat<3, 3> turned = hessian_contraction(stage.a.chord, force);

@@ -16,6 +16,7 @@ SpatialPaper::SpatialPaper(const Robot& robot)
       adjoints_(SpatialLaw::kAdjoint, robot.segments),
       hessians_(SpatialLaw::kHessian, robot.segments),
       bends_(robot.segments),
+      chords_(robot.segments),
       wrenches_(robot.segments) {}
 
 void SpatialPaper::set_inputs(const Command& command) {
@@ -40,7 +41,7 @@ bool SpatialPaper::evaluate(const Command& command, const std::vector<Control>& 
   for (int i = 0; i < n; ++i) {
     Bend& bend = bends_[i];
     laws_.get(i, bend.chord.v.data(), SpatialLaw::kBend);
-    move_up(bend, states[i], frames[i], states[i + 1], frames[i + 1]);
+    chords_[i] = move_up(bend, states[i], frames[i], states[i + 1], frames[i + 1]);
     objective += bend.objective;
     for (const double slope : bend.objective_slope.v)
       max_objective_slope = std::max(max_objective_slope, std::abs(slope));
@@ -59,7 +60,7 @@ void SpatialPaper::propagate_adjoints(const std::vector<State>& node_forces) {
     gradient[i] = bend.objective_slope;
     gradient[i] += transpose_times(bend.chord_slope, local.force);
     gradient[i] += transpose_times(bend.turn_slope, local.moment);
-    wrench.moment += cross(times(frames[i], bend.chord), wrench.force);
+    wrench.moment += cross(chords_[i], wrench.force);
   }
 }
 
@@ -67,7 +68,7 @@ void SpatialPaper::lagrangian_hessian(System& system) const {
   SpatialLaw::hessian_contraction(robot_.segments, inputs_, controls_, bendings_, adjoints_, hessians_);
   for (int i = 0; i < robot_.segments; ++i) {
     System::Stage& stage = system.stages[i];
-    assemble_stage(bends_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
+    assemble_stage(bends_[i], chords_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
     hessians_.get(i, stage.huu.v.data(), SpatialLaw::kHessian);
   }
   system.node_hessian[robot_.segments] = {};

@@ -78,6 +78,7 @@ class SpatialPaper {
   Rows controls_, bendings_, laws_, adjoints_;
   mutable Rows hessians_;
   std::vector<Bend> bends_;
+  std::vector<Vec<3>> chords_;    // of the segments, in the base frame
   std::vector<Wrench> wrenches_;  // adjoints of the upper state of each segment, in its lower disk's frame
 };
 

@@ -19,6 +19,7 @@ SpatialRod::SpatialRod(const Robot& robot)
       hessians_(SpatialArcLaw::kHessian, robot.segments),
       bends_(robot.segments),
       strain_slopes_(robot.segments),
+      chords_(robot.segments),
       wrenches_(robot.segments),
       cables_(robot.rod.cables, robot.segments),
       taken_(robot.rod.cables.size(), Rows(SpatialArcLaw::kCable, robot.segments)) {}
@@ -33,7 +34,7 @@ bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& co
   frames[0] = kBaseFrame;
   for (int i = 0; i < n; ++i) {
     laws_.get(i, bends_[i].chord.v.data(), SpatialArcLaw::kBend);
-    move_up(bends_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
+    chords_[i] = move_up(bends_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
     add_strain(i, controls[i]);
   }
   take_up_cables();
@@ -72,7 +73,7 @@ void SpatialRod::propagate_adjoints(const std::vector<State>& node_forces) {
     gradient[i] = strain_slopes_[i];
     gradient[i] += transpose_times(bends_[i].chord_slope, local.force);
     gradient[i] += transpose_times(bends_[i].turn_slope, local.moment);
-    wrench.moment += cross(times(frames[i], bends_[i].chord), wrench.force);
+    wrench.moment += cross(chords_[i], wrench.force);
   }
 }
 
@@ -80,7 +81,7 @@ void SpatialRod::lagrangian_hessian(System& system) const {
   SpatialArcLaw::hessian_contraction(robot_.segments, length_, controls_, adjoints_, hessians_);
   for (int i = 0; i < robot_.segments; ++i) {
     System::Stage& stage = system.stages[i];
-    assemble_stage(bends_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
+    assemble_stage(bends_[i], chords_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
     hessians_.get(i, stage.huu.v.data(), SpatialArcLaw::kHessian);
     for (int k = 0; k < kControl; ++k) stage.huu(k, k) += 2 * robot_.rod.stiffness[i * kControl + k];
   }

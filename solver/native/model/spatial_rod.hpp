@@ -89,6 +89,7 @@ class SpatialRod {
   mutable Rows hessians_;
   std::vector<Bend> bends_;
   std::vector<Control> strain_slopes_;  // slope of the objective in the controls
+  std::vector<Vec<3>> chords_;          // of the segments, in the base frame
   std::vector<Wrench> wrenches_;        // adjoints of the upper state of each segment, in its lower disk's frame
   RodCables<kControl> cables_;
   std::vector<Rows> taken_;  // what the segments take up from each cable, with its derivatives

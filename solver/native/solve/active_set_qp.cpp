@@ -241,6 +241,31 @@ bool ActiveSetQp<Model>::restore(const ContactProblem& problem, KktSystem& kkt, 
 }
 
 template <class Model>
+bool ActiveSetQp<Model>::find_softest(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active,
+                                      Direction& seed, Direction& softest) {
+  negative_ = kkt.negative;
+  for (int j = 0; j < active.count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
+  kkt.solve(problem, std::span(loads_).first(active.count));
+  if (factor_gram(active) != Gram::kSound) return false;
+  const typename ContactProblem::Slope slope{{}, -1, {}, seed.controls.data()};
+  const Load load{&slope, &softest};
+  for (int round = 0; round < kSofteningRounds; ++round) {
+    kkt.solve(problem, {&load, 1});
+    Multipliers change;
+    for (int j = 0; j < active.count; ++j) change[j] = -along(j, softest);
+    solve_gram(active.count, change);
+    for (int j = 0; j < active.count; ++j) softest.add(change[j], responses_[j]);
+    double largest = 0;
+    for (const auto& d : softest.controls)
+      for (const double part : d.v) largest = std::max(largest, std::abs(part));
+    if (!(largest > 0 && std::isfinite(largest))) return false;
+    for (std::size_t i = 0; i < seed.controls.size(); ++i)
+      for (int k = 0; k < Model::kControl; ++k) seed.controls[i][k] = softest.controls[i][k] / largest;
+  }
+  return true;
+}
+
+template <class Model>
 bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
   const Load load{nullptr, &step};
   kkt.solve(problem, {&load, 1});

@@ -31,6 +31,12 @@ class ActiveSetQp {
   // Finds the smallest step in the norm of H that closes the active gaps, as equalities, and satisfies all others.
   bool restore(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
+  // Finds, by inverse iteration, a direction on the tangent space of the active gaps in which the curvature of H is
+  // nearly the least; the closer H is to losing its definiteness there, the more nearly. Starts from the controls of
+  // `seed`, which it overwrites.
+  bool find_softest(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active, Direction& seed,
+                    Direction& softest);
+
   // Finds a further step near the last solve, on its active set and with its factorisation. False where a multiplier
   // would be negative.
   bool correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);

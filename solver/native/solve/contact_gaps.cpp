@@ -18,7 +18,7 @@ void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> n
       point[i * stride] = nodes[i];
       point[i * stride] += Model::lever(frames[i], line);
     }
-    for (int i = 0; i < robot.segments; ++i)
+    for (int i = 0; stride > 1 && i < robot.segments; ++i)
       for (int k = 1; k < stride; ++k) {
         const auto &here = point[i * stride], &next = point[(i + 1) * stride];
         const double t = static_cast<double>(k) / stride;
@@ -49,6 +49,7 @@ bool ContactProblem<Model>::out_of_reach(int obstacle, double motion) const {
 template <class Model>
 void ContactProblem<Model>::measure_gaps() {
   const int n = robot_.segments, stride = robot_.between + 1;
+  const int points = robot_.points(), positions = robot_.positions();
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
   double drift = 0;
@@ -61,14 +62,14 @@ void ContactProblem<Model>::measure_gaps() {
     if (out_of_reach(j, 0)) continue;
     const Obstacle& obstacle = obstacles_[j];
     const Position moved = this->displacement(j);
-    const int first = j * robot_.points();
+    const int first = j * points;
     for (int i = 0; i <= n; ++i) {
       const double distance = clearance_beyond(obstacle, minus(nodes_[i], moved), reach_);
       if (distance > 0) {
         i += static_cast<int>(std::min(distance / model_.segment_length(), static_cast<double>(n)));
         continue;
       }
-      for (int start = i * stride; start < robot_.points(); start += robot_.positions())
+      for (int start = i * stride; start < points; start += positions)
         for (int k = start; k < start + (i < n ? stride : 1); ++k) {
           if (!obstacle.touchable[k]) continue;
           ccr::measure_gaps(obstacle, std::span<const Position>(&points_[k], 1), moved, &gaps_[first + k]);

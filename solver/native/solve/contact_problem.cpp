@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 
 #include "model/models.hpp"
@@ -218,16 +217,6 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
   if constexpr (Model::kRod) model_.add_slacks(slack_multipliers);
   if (in_barrier())
     for (std::size_t i = 0; i < barrier_slope_.size(); ++i) model_.gradient[i] += barrier_slope_[i];
-}
-
-template <class Model>
-void ContactProblem<Model>::disturb_gradient() {
-  std::uint32_t number = 1;
-  for (Control& slope : model_.gradient)
-    for (double& part : slope.v) {
-      number = 1664525 * number + 1013904223;  // Knuth's generator
-      part += tolerances::kDisturbance * (number / 4294967296.0 - 0.5);
-    }
 }
 
 template <class Model>

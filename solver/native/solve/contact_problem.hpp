@@ -104,8 +104,6 @@ class ContactProblem {
 
   // Computes the gradient of the Lagrangian J - Σ λ c in controls and mounts.
   void reduced_gradient(const ActiveSet& active);
-  // Adds a small gradient of no symmetry, the same each time.
-  void disturb_gradient();
   // Exact Hessian of the Lagrangian, and the tensions of the cables [N]; both follow reduced_gradient.
   void lagrangian_hessian(const ActiveSet& active, System& system) const;
   Tensions tensions(const ActiveSet& active) const;

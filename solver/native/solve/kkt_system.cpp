@@ -107,10 +107,10 @@ void KktSystem<Model>::assemble_mounts(const ContactProblem& problem, const Acti
 template <class Model>
 bool KktSystem<Model>::factor(double damping) {
   ++factorizations;
-  negative = system_.factor(damping, Model::kRod ? static_cast<int>(system_.stages.size()) : 0);
+  negative = system_.factor(damping, counts_inertia ? Model::kControl * static_cast<int>(system_.stages.size()) : 0);
   if (negative < 0 || mount_hessian_.empty()) return negative >= 0;
   const int of_mounts = factor_mounts(damping / (arm_ * arm_));
-  if (of_mounts < 0 || (of_mounts > 0 && !Model::kRod)) return false;
+  if (of_mounts < 0 || (of_mounts > 0 && !counts_inertia)) return false;
   negative += of_mounts;
   return true;
 }
@@ -141,7 +141,7 @@ int KktSystem<Model>::factor_mounts(double damping) {
     }
   // Of a touched mount only the Schur complement matters, whose curvature may have any sign.
   for (Mat<kSpace, kSpace>& factor : mount_factor_)
-    if (const int own = factorize(factor); own < 0 || (own > 0 && !Model::kRod)) return -1;
+    if (const int own = factorize(factor); own < 0 || (own > 0 && !counts_inertia)) return -1;
   return negative;
 }
 

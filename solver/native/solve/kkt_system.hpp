@@ -48,6 +48,7 @@ class KktSystem {
 
   std::int64_t factorizations = 0;                         // so far
   int negative = 0;                                        // eigenvalues at the last factor
+  bool counts_inertia = Model::kRod;                       // whether H may have negative eigenvalues
   double penalty(int j) const { return penalty_[j]; }      // on the j-th active gap
   double max_curvature() const { return max_curvature_; }  // of a shear
 

@@ -16,7 +16,6 @@ struct ModelContinuation<Model>::Pursuit {
   double step = kLargestStep;
   double yielding = kYield;  // least displacement of the next yield [a]
   bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
-  int ends = 0;              // of branches
   Status reached = Status::kConverged;
   bool over = false;  // with `reached`
 };
@@ -180,9 +179,9 @@ ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(
 template <class Model>
 Status ModelContinuation<Model>::pursue(const Command& target) {
   Pursuit pursuit{.wanted = target};
+  newton_.begin_step();
   const double limit = problem_.robot().max_tension;
-  const int steps = kSubSteps + static_cast<int>(2 * command_distance(present_.command, target) / kLargestStep);
-  for (int sub = 0; sub < steps && pursuit.ends < kBranchEnds && !work_is_spent(); ++sub) {
+  for (int sub = 0; sub < kSubSteps && !work_is_spent(); ++sub) {
     // A release may lead to more tension than a motor holds: it yields until it holds again.
     if (highest(tensions_) > limit) {
       if (yield_cables(pursuit.wanted, pursuit.yielding)) {
@@ -232,7 +231,6 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     if (end == End::kSnapped) pursuit.reached = std::max(pursuit.reached, Status::kSnapped);
     step = 2 * kSmallestStep;
     pursuit.refined = false;
-    ++pursuit.ends;
   }
   if (!stalled) return true;
   pursuit.reached = std::max(pursuit.reached, Status::kStalled);

@@ -42,13 +42,20 @@ bool Newton<Model>::is_equilibrium(const ActiveSet& active) const {
   return worst <= problem.stationarity_tolerance(active) && gaps_closed(active, kFeasibility);
 }
 
+// Where contacts hold a robot of the paper's models far from its free shape, no penalty may be strong enough: a step
+// that takes much work counts the inertia instead.
+template <class Model>
+void Newton<Model>::choose_test() {
+  kkt_.counts_inertia = Model::kRod || factorizations() - factorizations_before_ > kPenaltyWork;
+}
+
 // Factors the exact Hessian; where that fails, with a growing penalty on the active gaps, which leaves the solution
-// unchanged and succeeds if H is positive definite on their tangent space. A rod needs no penalty: whether H is
-// positive definite there is read off its inertia.
+// unchanged and succeeds if H is positive definite on their tangent space. Where the inertia is counted, no penalty is
+// needed: whether H is positive definite there is read off it.
 template <class Model>
 bool Newton<Model>::factor_penalized(const ActiveSet& active, int penalties) {
   damping_ = 0;
-  if (Model::kRod) {
+  if (kkt_.counts_inertia) {
     kkt_.assemble(problem, active, 0);
     return kkt_.factor(0);
   }
@@ -125,14 +132,6 @@ double Newton<Model>::merit(double weight) const {
 
 namespace {
 
-template <class Model>
-void advance(const Iterate<Model>& from, double scale, const Direction<Model>& step, Iterate<Model>& to) {
-  for (std::size_t i = 0; i < from.controls.size(); ++i)
-    for (int k = 0; k < Model::kControl; ++k) to.controls[i][k] = from.controls[i][k] + scale * step.controls[i][k];
-  for (std::size_t m = 0; m < from.mounts.size(); ++m)
-    for (int k = 0; k < Model::kSpace; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
-}
-
 // Interpolates multipliers from one active set to another, at a fraction of the step.
 void blend(const ActiveSet& from, double scale, ActiveSet& to) {
   if (scale == 1) return;
@@ -177,6 +176,7 @@ template <class Model>
 NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
+  choose_test();
   double weight = 0;
   bool close = false, stable = true;  // whether the last H was positive definite on their tangent space
   needed_damping_ = 0;
@@ -221,6 +221,8 @@ bool Newton<Model>::set_metric(const Iterate& at) {
   needed_damping_ = 0;
   stretch_ = kStretch;
   creeping_ = false;
+  lowest_ = HUGE_VAL;
+  flat_ = 0;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
   return factor_convexified(at.active, kDescentPenalties) && factor_metric();
@@ -264,27 +266,29 @@ template <class Model>
 NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
+  choose_test();
   problem.reduced_gradient(at.active);
   const bool stationary = is_equilibrium(at.active);
   result.converged = stationary && factor_stable(at.active, kPenalties);
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
-  if (stationary) problem.disturb_gradient();  // a saddle, as a symmetric robot reaches: leave it to either side
-  ActiveSet target = at.active;
-  if (!qp_.solve(problem, kkt_, target, step_)) {  // not stable without a gap that it drops
-    target = at.active;
-    if (!Model::kRod || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
+  const bool flat = is_flat(at.active);
+  if (stationary || (flat && damping_ > 0)) {
+    result.moved = leave_saddle(at, largest);
+    if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;
   }
-  // Closing gaps that are open within the tolerance may cost energy: λ times the gap.
-  const double before = problem.energy();
-  double allowed = before + kEnergyRoundoff * before;
-  for (int j = 0; j < target.count; ++j)
-    allowed += 2 * kDescentFeasibility * problem.robot().max_length * target.multiplier[j];
-  const double whole = std::min(1.0, largest / step_size(step_));
+  ActiveSet target = at.active;
+  if (!qp_.solve(problem, kkt_, target, step_) &&
+      !(flat && release_lowest(at, target))) {  // not stable without a gap that it drops
+    target = at.active;
+    if (!kkt_.counts_inertia || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
+  }
+  const double allowed = problem.energy() + rise_of_roundoff(target);
+  const double size = step_size(step_), whole = std::min(1.0, largest / size);
   trial_.command = at.command;
   const ActiveSet touching = closed_contacts(target);
   // Where H is not positive definite, the energy keeps falling beyond the end of a damped step.
   const bool stretched = damping_ > 0 && touching.count == target.count;
-  const double farthest = stretched ? std::min(stretch_, largest / step_size(step_)) : whole;
+  const double farthest = stretched ? std::min(stretch_, largest / size) : whole;
   double scale = farthest;
   // The norm of restorations: near a fold the energy hardly resists the motion that ends the branch, so damping is
   // added.
@@ -293,13 +297,14 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
     trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap with a multiplier
     advance(at, scale, step_, trial_);
     if (!restore(trial_)) continue;
-    if (problem.energy() > allowed) continue;
+    // A step beyond a corner may be restored to where it began.
+    if (problem.energy() > allowed || !has_moved(at, kProgress * scale * size)) continue;
     std::swap(at.controls, trial_.controls);
     std::swap(at.mounts, trial_.mounts);
     at.active = closed_contacts(target);
     result.moved = true;
     // Heavily damped steps are too short far from the end of a descent; near it a stronger penalty instead is harmless.
-    creeping_ = !creeping_ && scale * step_size(step_) < kCreep;
+    creeping_ = !creeping_ && scale * size < kCreep;
     if (stretched) stretch_ = scale == farthest ? kStretch * scale : std::max(kStretch, scale);
     return result;
   }

@@ -15,6 +15,15 @@ struct NewtonResult {
   bool moved = false;  // descent: whether another shape was reached
 };
 
+// Leaves in `to` a part of a step away from a shape.
+template <class Model>
+void advance(const Iterate<Model>& from, double scale, const Direction<Model>& step, Iterate<Model>& to) {
+  for (std::size_t i = 0; i < from.controls.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k) to.controls[i][k] = from.controls[i][k] + scale * step.controls[i][k];
+  for (std::size_t m = 0; m < from.mounts.size(); ++m)
+    for (int k = 0; k < Model::kSpace; ++k) to.mounts[m][k] = from.mounts[m][k] + scale * step.mounts[m][k];
+}
+
 template <class Model>
 class Newton {
  public:
@@ -26,6 +35,9 @@ class Newton {
   // Newton iteration with an l1 merit line search, for a start close to a stable equilibrium. Gives up where H is not
   // positive definite on the tangent space of the active gaps, but for the first `damped` iterations, which are damped.
   NewtonResult solve(Iterate& at, int damped);
+
+  // Begins to count the work of a step.
+  void begin_step() { factorizations_before_ = factorizations(); }
 
   // One iterate of a feasible descent. Where `at` is an equilibrium, returns `converged`; otherwise moves `at` to a
   // feasible shape of no more energy, by a step of at most the size `largest`, and returns whether it `moved`.
@@ -45,6 +57,8 @@ class Newton {
   bool is_equilibrium(const ActiveSet& active) const;
   ActiveSet closed_contacts(const ActiveSet& active) const;
   bool gaps_closed(const ActiveSet& active, double tolerance) const;
+  void choose_test();
+  bool release_lowest(Iterate& at, ActiveSet& target);
   bool factor_penalized(const ActiveSet& active, int penalties);
   bool factor_stable(const ActiveSet& active, int penalties);
   bool factor_convexified(const ActiveSet& active, int penalties);
@@ -52,18 +66,25 @@ class Newton {
   bool factor_definite();
   bool factor_metric();
   double step_size(const Direction<Model>& step) const;
+  double rise_of_roundoff(const ActiveSet& active) const;
+  bool has_moved(const Iterate& from, double least) const;
+  bool is_flat(const ActiveSet& active);
+  bool leave_saddle(Iterate& at, double largest);
   double merit(double weight) const;
   double line_search(const Iterate& at, const ActiveSet& target, double& weight);
 
   KktSystem<Model> kkt_;
   ActiveSetQp<Model> qp_;
   Direction<Model> step_, correction_;
-  double step_size_ = 0;  // of `step_`
+  double step_size_ = 0;                    // of `step_`
+  std::int64_t factorizations_before_ = 0;  // of the step
   Iterate trial_;
   double damping_ = 0;
   double needed_damping_ = 0;  // damping that was needed last in this descent
   double stretch_ = 1;         // of the next damped iterate of this descent
   bool creeping_ = false;      // whether the iterates of this descent hardly move
+  double lowest_ = 0;          // energy of this descent when it fell last
+  int flat_ = 0;               // iterates since then
 };
 
 }  // namespace ccr

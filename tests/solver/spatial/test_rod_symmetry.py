@@ -55,6 +55,8 @@ def test_in_a_plane_it_is_the_rod_of_the_plane(pulls, distance):
 
 def test_it_leaves_the_plane_where_that_is_unstable():
     """Pressed against a wall beyond the pull of 6.66, the robot slips aside and turns, by any side."""
-    spec = robots.space(18, 0.0, touch=BACKBONE, obstacles=[{"kind": "wall", "offset": -26.0, "normal": [-1.0, 0.0, 0.0]}])
+    spec = robots.space(
+        18, 0.0, touch=BACKBONE, obstacles=[{"kind": "wall", "offset": -26.0, "normal": [-1.0, 0.0, 0.0]}]
+    )
     found = robots.read(robots.pulled(robots.require(spec), 7.0, steps=40))
     assert abs(found.places[-1, 1]) > 1.0

@@ -1,0 +1,85 @@
+"""Steps that used to be given up on, though the robot has somewhere to go on to."""
+
+from dataclasses import replace
+
+import pytest
+
+from solver import Capsule, Circle, Ellipse, Polygon, Robot, Scene, Solver, Status
+
+PAPER = replace(Robot.prototype(), model="paper", touch=("backbone", "cable"), between=0)
+SMALL = replace(PAPER, length_mm=12.45, offset_mm=0.8, disk_radius_mm=0.8, rigidity=50.0, max_cable_mm=2.513)
+SMALL = replace(SMALL, length_range_mm=(10.0, 18.0))
+FED_PAST_A_BLADE = (
+    Ellipse(center=(7.517, 5.66758), radii=(0.66, 8.712), axis=(0.9751439207111313, 0.2215724123173344)),
+    Polygon(
+        corners=(
+            (3.363518041240354, 11.57050760433798),
+            (4.497782885106401, 11.331425116989786),
+            (5.15785557274211, 11.93461064053492),
+            (4.99968110170852, 13.113350680076866),
+            (3.720074786237231, 13.446416905073002),
+            (3.003135788555102, 12.411362789763993),
+        ),
+        radius=0.01511475724277192,
+    ),
+)
+DRAWN_BETWEEN_PEGS = (
+    Circle(center=(2.386779520237013, 8.095214790533433), radius=0.6171250153226011),
+    Capsule(
+        start=(1.7953188807416158, 9.835437055995236),
+        end=(1.553613436004829, 11.267362779405195),
+        radius=0.542042387783304,
+    ),
+)
+PULLED_OVER_A_CORNER = (
+    Polygon(
+        corners=(
+            (66.74788547615796, 126.05682216139398),
+            (76.57568776480407, 122.47405888079179),
+            (84.78841132876629, 125.67356404852296),
+            (89.6519022707869, 136.0134820803337),
+            (86.08416841878844, 145.3360100775749),
+            (74.39979787176121, 149.7013800648187),
+            (67.23635244444719, 146.6254639700638),
+            (62.322530053509, 135.8620832859514),
+        ),
+        radius=0.0009483398295753459,
+    ),
+    Ellipse(
+        center=(53.46866839038217, 114.38317859160757),
+        radii=(6.6, 28.525627101708725),
+        axis=(0.3615523259858288, 0.9323518196336815),
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("robot", "scene", "commands"),
+    [
+        (SMALL, FED_PAST_A_BLADE, ((0.4446571028486126, 10.0), (0.5780542337031963, 16.32107474166508))),
+        (
+            SMALL,
+            DRAWN_BETWEEN_PEGS,
+            (
+                (0.9147190718841882, 10.369013387571854),
+                (1.0138508024400679, 17.610200131277423),
+                (0.7344271906596117, 10.819696281678713),
+                (0.63593875534001, 10.65334004581997),
+            ),
+        ),
+        (
+            PAPER,
+            PULLED_OVER_A_CORNER,
+            ((11.760266471349633, None), (12.321153669669558, None), (12.487393185968, None)),
+        ),
+    ],
+    ids=["no penalty shows that it is stable", "pegs hold it far from its free shape", "a step beyond a corner"],
+)
+def test_not_given_up(robot, scene, commands):
+    solver = Solver(robot, Scene(scene))
+    equilibrium = solver.rest()
+    for command in commands:
+        equilibrium = solver.step(equilibrium, *(part for part in command if part is not None))
+        assert equilibrium.status is not Status.GAVE_UP
+        residuals = equilibrium.residuals()
+        assert max(residuals.stationarity, residuals.lengths, residuals.gaps, residuals.complementarity) <= 1e-8
