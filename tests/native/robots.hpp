@@ -28,13 +28,21 @@ struct RobotNumbers {
   int between = 0;
 };
 
+// An even rod, with a cable towards +x to its tip.
+inline Rod make_rod(const RobotNumbers& of) {
+  const std::size_t numbers = 3 * static_cast<std::size_t>(of.segments);  // in the plane a third of them serves
+  return {.cables = {{{{of.offset, 0}}, of.segments}},
+          .stiffness = std::vector<double>(numbers, 1),
+          .rest = std::vector<double>(numbers, 0)};
+}
+
 // A robot with these lines of points that can touch, each a position on the disks.
 inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
   const double segment = of.length / of.segments;
   std::vector<double> edges;  // longer by about as much as the disks of a segment can turn
   for (const Vec<2>& line : lines)
     edges.push_back((segment + norm(line) * (of.rod ? segment / of.offset : 0.4)) / (of.between + 1));
-  return {.model = of.rod ? ModelKind::kRod : ModelKind::kPaper,
+  return {.model = of.rod ? ModelKind::kPlanarRod : ModelKind::kPlanarPaper,
           .segments = of.segments,
           .offset = of.offset,
           .angle = of.angle,
@@ -45,7 +53,8 @@ inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
           .disk_thickness = 0,
           .lines = std::move(lines),
           .edges = std::move(edges),
-          .between = of.between};
+          .between = of.between,
+          .rod = of.rod ? make_rod(of) : Rod{}};
 }
 
 // Lines on backbone and cable in the plane; in space on the backbone, through both holes, and opposite them.
@@ -54,7 +63,7 @@ Robot make_robot(const RobotNumbers& of) {
   const double a = of.offset, x = a * std::cos(of.angle), y = a * std::sin(of.angle);
   if (D == 2) return make_robot(of, {{{0, 0}}, {{a, 0}}});
   Robot robot = make_robot(of, {{{0, 0}}, {{a, 0}}, {{x, y}}, {{-a, 0}}, {{-x, -y}}});
-  robot.model = ModelKind::kSpatial;
+  robot.model = of.rod ? ModelKind::kSpatialRod : ModelKind::kSpatialPaper;
   return robot;
 }
 

@@ -47,7 +47,7 @@ struct Wanted {
   // Puts the walls where the gaps have their wanted values.
   void build_walls() {
     REQUIRE(problem.evaluate(at));
-    if constexpr (Model::kRod) at.command.cables[0] += problem.gaps()[problem.slack_contact()] - gaps.back();
+    if constexpr (Model::kRod) at.command.cables[0] += problem.gaps()[problem.slack_contact(0)] - gaps.back();
     obstacles.clear();
     for (int j = 0; j < walls(); ++j)
       obstacles.push_back(for_point(
@@ -233,7 +233,7 @@ void restorations() {
   }
 }
 
-#define CCR_MODELS Planar<PaperLaw>, Planar<RodLaw>, Spatial
+#define CCR_MODELS PlanarPaper, PlanarRod, SpatialPaper, SpatialRod
 
 TEST_CASE_TEMPLATE("the active set and multipliers are those that were chosen", Model, CCR_MODELS) {
   chosen_sets<Model>();

@@ -169,13 +169,13 @@ void kkt_systems() {
   CHECK(definite >= 5);
 }
 
-TEST_CASE_TEMPLATE("the gradient of the Lagrangian matches differences of its value", Model, Planar<PaperLaw>,
-                   Planar<RodLaw>, Spatial) {
+TEST_CASE_TEMPLATE("the gradient of the Lagrangian matches differences of its value", Model, PlanarPaper, PlanarRod,
+                   SpatialPaper, SpatialRod) {
   slopes<Model>();
 }
 
 TEST_CASE_TEMPLATE("the KKT system solves with the Hessian of the Lagrangian, springs and penalties included", Model,
-                   Planar<PaperLaw>, Planar<RodLaw>, Spatial) {
+                   PlanarPaper, PlanarRod, SpatialPaper, SpatialRod) {
   kkt_systems<Model>();
 }
 

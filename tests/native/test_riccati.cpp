@@ -4,7 +4,7 @@
 #include "dense.hpp"
 #include "math/riccati.hpp"
 #include "model/planar.hpp"
-#include "model/spatial.hpp"
+#include "model/spatial_chain.hpp"
 #include "random.hpp"
 
 namespace ccr::testing {
