@@ -42,7 +42,7 @@ class SpatialRod {
   void lagrangian_hessian(System& system) const;
   Vec<kCables> displacement_slopes() const { return {}; }  // the tensions are the multipliers of the slacks
 
-  bool bends_evenly() const { return false; }
+  bool has_free_form() const { return false; }
   Control free_control(const Command&) const { return {}; }
   double free_slack_multiplier() const { return 0; }
   Vec<1> free_slopes(const Command&) const { return {}; }
