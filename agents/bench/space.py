@@ -136,7 +136,8 @@ def path_times(robot: SpatialRobot) -> list[float]:
 def measure(steps: int) -> JsonObject:
     """Return all measurements by name: of the paper's model, and of the rod."""
     return {
-        "paper": summary(contact_mix(steps)) | grown([SpatialRobot.prototype(model="paper", segments=n) for n in SEGMENTS]),
+        "paper": summary(contact_mix(steps))
+        | grown([SpatialRobot.prototype(model="paper", segments=n) for n in SEGMENTS]),
         "rod": summary(contact_mix(steps, robot=rod(4))) | grown([rod(4, n) for n in SEGMENTS]),
         "rod_cables_mean_us": dict(zip("2346", growth([rod(cables) for cables in (2, 3, 4, 6)]), strict=True)),
     }

@@ -24,8 +24,8 @@ struct RobotNumbers {
   bool rod = false;
   int segments = 18;
   double length = 180, offset = 8, rigidity = 5000, max_tension = 15;
-  double angle = kQuarterTurn;        // between the cables, in the paper's model of space
-  std::vector<double> cables = {0};   // angles of a rod's
+  double angle = kQuarterTurn;       // between the cables, in the paper's model of space
+  std::vector<double> cables = {0};  // angles of a rod's
   int between = 0;
 };
 

@@ -151,7 +151,7 @@ class ContactProblem {
   int first_disk_contact() const { return contacts() + (Model::kRod ? static_cast<int>(robot_.rod.cables.size()) : 0); }
   bool has_loads() const { return robot_.loaded(); }
   bool has_free_form() const { return model_.has_free_form(); }  // of the shape of the robot that nothing touches
-  double lever_arm(int contact) const;                         // approximate derivative of the gap in a control [mm]
+  double lever_arm(int contact) const;                           // approximate derivative of the gap in a control [mm]
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
  private:

@@ -72,7 +72,8 @@ template <class Model>
 bool ModelContinuation<Model>::is_clear_at(const Command& start, double part) {
   if (bends_evenly_) {
     trial_.command = between(start, present_.command, part);
-    return bend_freely() && problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
+    return bend_freely() && problem_.evaluate(trial_) &&
+           problem_.violation() <= kFeasibility * problem_.robot().max_length;
   }
   trial_ = before_contact_;
   trial_.command = between(before_contact_.command, at_contact_, part);
@@ -103,7 +104,7 @@ ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(cons
 
 #define CCR_INSTANTIATE(Model)                                                 \
   template StepResult ModelContinuation<Model>::rest(double, double*);         \
-  template bool ModelContinuation<Model>::bend_freely(); \
+  template bool ModelContinuation<Model>::bend_freely();                       \
   template void ModelContinuation<Model>::keep_before_contact(const Iterate&); \
   template ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
