@@ -3,6 +3,7 @@
 from solver.cache.memo import TransitionMemo
 from solver.common.equilibrium import Optimality, Residuals
 from solver.common.obstacle import Extent, Obstacle
+from solver.common.presets import PRESETS, Preset
 from solver.common.rod import Cable, Load
 from solver.common.scene import Scene
 from solver.common.status import Status
@@ -30,6 +31,7 @@ from solver.planar.sensitivity import Sensitivity, sensitivity
 from solver.planar.solve import Solver
 
 __all__ = [
+    "PRESETS",
     "BatchSolver",
     "Cable",
     "Capsule",
@@ -45,6 +47,7 @@ __all__ = [
     "Obstacle",
     "Optimality",
     "Polygon",
+    "Preset",
     "ReferenceBatch",
     "ReferenceSolver",
     "Residuals",
