@@ -77,9 +77,8 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             max_tension=30.0,
             sections=2,
             cables=3,
-            source="Rao, Peyron, Lilge, Burgner-Kahrs 2021 and its code: E = 54 GPa, ν = 0.3, backbone 1.4 mm, two "
-            "sections of 100 mm, ten disks and three cables at 120° each, a = 8 mm; first cable turned to +x; "
-            "tension limit typical",
+            source="Rao, Peyron, Lilge, Burgner-Kahrs 2021 (doi 10.3389/frobt.2020.630245) and the code published with "
+            "it: E = 54 GPa, ν = 0.3, backbone 1.4 mm; tension limit typical",
         ),
         "snake_arm": Preset(
             length_mm=1000.0,
@@ -88,7 +87,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             rigidity=round_rigidity(NITI, 4.0),
             max_tension=200.0,
             sections=2,
-            source="typical: an inspection arm 40 mm wide, with a NiTi rod of 4 mm, E = 60 GPa, and a disk every 25 mm",
+            source="typical: an inspection arm with disks of 40 mm, 25 mm apart, on a NiTi rod of 4 mm with E = 60 GPa",
         ),
         "neuroendoscope": Preset(
             length_mm=60.0,
@@ -97,8 +96,8 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             rigidity=round_rigidity(NITI, 0.4),
             max_tension=10.0,
             sections=2,
-            source="Kato, Okumura, Song, Golby, Hata 2015: two sections, 60 mm long, 1.7 mm wide, which leaves "
-            "a = 0.7 mm; the rest typical: stiff as a NiTi rod of 0.4 mm, E = 60 GPa",
+            source="Kato, Okumura, Song, Golby, Hata 2015 (doi 10.1109/TMECH.2014.2372635): two sections, 60 mm long, "
+            "1.7 mm wide, which leaves a = 0.7 mm; the rest typical, stiff as a NiTi rod of 0.4 mm with E = 60 GPa",
         ),
         "guidewire": Preset(
             length_mm=20.0,
@@ -106,8 +105,8 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             offset_mm=0.3,
             rigidity=round_rigidity(NITI, 0.2),
             max_tension=2.0,
-            source="typical: the steerable tip of a 0.035-inch (0.89 mm) guidewire, stiff as a NiTi core of 0.2 mm, "
-            "E = 60 GPa",
+            source="typical: the steerable tip of a 0.035-inch (0.89 mm) guidewire, stiff as a NiTi core of 0.2 mm "
+            "with E = 60 GPa",
         ),
     }
 )

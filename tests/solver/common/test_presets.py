@@ -1,6 +1,7 @@
 """Every preset builds, rests, bends within its tension limit, touches an obstacle and scales, in plane and in space."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -168,3 +169,56 @@ def test_refusals(kind, name, changes, message):
 def test_unknown_fields_are_refused(kind):
     with pytest.raises(TypeError, match="stiffness"):
         KINDS[kind][0].preset("guidewire", stiffness=3)
+
+
+def test_table_of_the_docs_is_this_table():
+    page = (Path(__file__).parents[3] / "docs" / "model.md").read_text()
+    for name in PRESETS:
+        assert table_row(name) in page
+
+
+def table_row(name):
+    """The row of a preset in docs/model.md: what it is, and what was measured of it in the plane."""
+    row = PRESETS[name]
+    layout = {0: "1 (in space 2 at 90°)", 3: "3 at 120°", 4: "4 at 90°"}[row.cables]
+    planar = {0: "one at 0", 3: "a at 0, a/2 at π", 4: "a at 0 and π"}[row.cables]
+    bends = [largest_bend(name, side) for other, side in SIDES if other == name]
+    needed = " / ".join(f"{tension_at_60_degrees(name, side):.3g}" for other, side in SIDES if other == name)
+    reach = " / ".join(f"{turn:+.0f}° ({limit})".replace("-", "−") for turn, limit in bends)
+    sections = f"{row.sections} × " if row.sections > 1 else ""
+    cells = [
+        f"`{name}`",
+        f"{row.length_mm:g}",
+        f"{row.offset_mm:g}",
+        row.segments,
+        f"{row.rigidity:.{0 if row.rigidity > 100 else 1}f}",
+        row.torsion_ratio,
+        sections + layout,
+        planar,
+        f"{row.max_tension:g}",
+        needed,
+        reach,
+        row.source,
+    ]
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def tension_at_60_degrees(name, side):
+    """The largest tension where the planar robot's sections are bent by 60° each [N]."""
+    robot = Robot.preset(name, model="rod")
+    return pulled(Solver(robot, Scene()), pulls(robot, PRESETS[name].sections * TURN, side))[-1].tensions.max()
+
+
+def largest_bend(name, side):
+    """How far the tip of the planar robot turns by a pull of the last section's cable [°], and what stops it."""
+    robot = Robot.preset(name, model="rod")
+    limit, solver = robot.cable_limit_mm, Solver(robot, Scene())
+    works = pulls(robot, 1.0, side) > 0
+    state = solver.step(solver.rest(), tuple(np.where(works, 0.0, robot.least_cable_mm)))
+    for k in range(1, 201):
+        pull = limit * k / 200
+        state = solver.step(state, tuple(np.where(works, pull, robot.least_cable_mm)))
+        if state.status is Status.STALLED:
+            return math.degrees(turned(state)), "tension"
+        assert state.status is Status.CONVERGED
+    return math.degrees(turned(state)), "cable"
