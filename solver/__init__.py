@@ -8,6 +8,7 @@ from solver.common.rod import Cable, Load
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.common.trace import Trace
+from solver.common.transmission import Transmission
 from solver.planar.batch import BatchSolver, ReferenceBatch
 from solver.planar.custom import Custom
 from solver.planar.equilibrium import Equilibrium
@@ -59,6 +60,7 @@ __all__ = [
     "Status",
     "Trace",
     "TransitionMemo",
+    "Transmission",
     "VirtualWork",
     "clearance",
     "contact_estimate",
