@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
 
+from solver.common.presets import preset_fields
 from solver.common.robot import (
     check_cable_limit,
     check_disks,
@@ -128,6 +129,21 @@ class Robot:
             TypeError: If a field is none of the robot's.
         """
         return cls(**{"length_mm": 180.0, "segments": 18, "offset_mm": 8.0, **changes})
+
+    @classmethod
+    def preset(cls, name: str, **changes: Any) -> "Robot":
+        """Return a rod that people have, by its name in :data:`solver.PRESETS`; ``docs/model.md`` has the table.
+
+        Args:
+            name: ``"prototype"``, ``"three_cables"``, ``"rao_2021"``, ``"snake_arm"``, ``"neuroendoscope"`` or
+                ``"guidewire"``. In the plane it has a pair of opposed cables a section, the prototype a single one.
+            **changes: Fields of the robot that are to be others, such as ``segments=40``; the cables follow.
+
+        Raises:
+            ValueError: If there is no such preset, and as the robot.
+            TypeError: If a field is none of the robot's.
+        """
+        return cls(**preset_fields(name, changes, 2))
 
     def at(self, length_mm: float) -> "Robot":
         """Return the same robot, inserted to a length at rest [mm].
