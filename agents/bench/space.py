@@ -12,7 +12,7 @@ from agents.files import JsonObject
 from solver import Cable, Scene, Status
 from solver.spatial import Cylinder, SpatialEquilibrium, SpatialRobot, SpatialSolver, Sphere
 
-SEGMENTS = (9, 18, 36, 72, 144)
+SEGMENTS = (18, 36, 72, 144)  # the sphere of the path could slip through the edges of fewer
 STEPS_PER_SCENE = 200
 GOAL_STEPS = 50  # steps that drift towards the same goal
 LARGEST_CABLE = 11.0  # [mm]
@@ -54,6 +54,11 @@ def timed_step(solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndar
     return Timed(solver, start, cables, end, elapsed)
 
 
+def paper(segments: int = 18) -> SpatialRobot:
+    """Return the prototype of the paper's model."""
+    return SpatialRobot.prototype(model="paper", segments=segments)
+
+
 def rod(cables: int, segments: int = 18) -> SpatialRobot:
     """Return the prototype as a rod with a number of even cables, with two those of the paper's model."""
     turn = 4 if cables == 2 else cables
@@ -77,7 +82,7 @@ def _directions(robot: SpatialRobot) -> np.ndarray:
 
 def contact_mix(steps: int, seed: int = 0, robot: SpatialRobot | None = None) -> Iterator[SpatialStep]:
     """Yield steps of random increments of ±0.3 mm with a drift towards an obstacle or, one time in five, anywhere."""
-    generator, robot = np.random.default_rng(seed), robot or SpatialRobot.prototype(model="paper")
+    generator, robot = np.random.default_rng(seed), robot or paper()
     for _ in range(steps // STEPS_PER_SCENE):
         solver = random_solver(generator, robot)
         now, goal = solver.rest(), np.zeros(2)

@@ -155,6 +155,6 @@ def _cable(control: ca.SX, hole: ca.SX, shared: Shared) -> tuple[ca.SX, ca.SX, c
     return c + g * moved, offset * g * twist, ahead_slope, aside_slope
 
 
-def _both(a: ca.SX, b: ca.SX) -> ca.SX:
+def _both(a: ca.SX, b: ca.SX | ca.DM) -> ca.SX:
     """Return ``a bᵀ + b aᵀ``."""
     return a @ b.T + b @ a.T

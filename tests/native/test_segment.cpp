@@ -192,7 +192,7 @@ Vec<3> turn(const Mat<3, 3>& from, const Mat<3, 3>& to) {
 struct Arc {
   Vec<3> chord;
   Mat<3, 3> rotation, chord_slope, turn_slope;
-  double chord_length[3], spread[3];
+  double shared[SpatialArcLaw::kShared];
 };
 static_assert(sizeof(Arc) == SpatialArcLaw::kBend * sizeof(double));
 
@@ -204,18 +204,21 @@ struct Arcs {
     bends.get(0, at.chord.v.data(), SpatialArcLaw::kBend);
   }
 
-  std::array<double, SpatialArcLaw::kCable> take(const Vec<2>& hole) const {
-    Rows cable(SpatialArcLaw::kCable, 1);
+  // Length taken up from a cable, its slope and its Hessian.
+  std::array<double, 13> take(const Vec<2>& hole) const {
+    Rows cable(SpatialArcLaw::kCable, 1), hessian(SpatialArcLaw::kHessian, 1);
     SpatialArcLaw::take(1, length, hole.v.data(), controls, bends, cable);
-    std::array<double, SpatialArcLaw::kCable> out;
+    SpatialArcLaw::cable_hessian(1, hole.v.data(), controls, bends, hessian);
+    std::array<double, 13> out;
     cable.get(0, out.data(), SpatialArcLaw::kCable);
+    hessian.get(0, out.data() + SpatialArcLaw::kCable, SpatialArcLaw::kHessian);
     return out;
   }
   Mat<3, 3> hessian_contraction(const Vec<3>& force, const Vec<3>& moment) const {
     Rows adjoints(SpatialArcLaw::kAdjoint, 1), hessians(SpatialArcLaw::kHessian, 1);
     adjoints.put(0, force.v.data(), 3);
     adjoints.put(0, moment.v.data(), 3, 3);
-    SpatialArcLaw::hessian_contraction(1, length, controls, adjoints, hessians);
+    SpatialArcLaw::hessian_contraction(1, controls, bends, adjoints, hessians);
     Mat<3, 3> out;
     hessians.get(0, out.v.data(), SpatialArcLaw::kHessian);
     return out;

@@ -34,4 +34,4 @@ def test_kernel_in_space():
     assert found["sign_changes"] > 0
     rods = space.summary(space.contact_mix(400, robot=space.rod(4)))
     assert rods["in_contact"] > 0.1
-    assert min(space.growth([space.rod(3, 9), space.rod(6, 18)], repeats=1)) > 0
+    assert min(space.growth([space.rod(3, 18), space.rod(6, 24)], repeats=1)) > 0
