@@ -35,9 +35,10 @@ class Robot:
         max_tension: Cable tension the motor can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, which turns the tip by 180°, but at most
             half the shortest length.
-        model: ``"paper"``, the model of the paper: every segment takes an equal share of the cable displacement and may
-            shear. ``"rod"``: the cable slides through the disks without friction and can go slack, and segments are
-            arcs (Rao 2024); with more segments this robot converges to the elastica under constant tendon tension.
+        model: ``"rod"``: cables slide through the disks without friction and can go slack, and segments are arcs
+            (Rao 2024); with more segments this robot converges to the elastica under constant tendon tension, and its
+            contact forces are those of statics. ``"paper"``, the model of the paper to the letter: every segment takes
+            an equal share of the cable displacement and may shear.
         length_range_mm: Shortest and longest length the base can insert [mm]; ``None`` for a robot of fixed length.
         touch: Lines whose points can touch obstacles: ``"backbone"``, ``"cable"``, those of all cables (both in the
             paper), and ``"rim"``, the edge of the disks on the side of −x.
@@ -63,7 +64,7 @@ class Robot:
     rigidity: float = 5000.0
     max_tension: float = 15.0
     max_cable_mm: float | None = None
-    model: Literal["paper", "rod"] = "paper"
+    model: Literal["paper", "rod"] = "rod"
     length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0

@@ -80,7 +80,7 @@ class SpatialRobot:
     touch: tuple[str, ...] = ("backbone", "holes")
     rim_points: int = 16
     between: int = 0
-    model: Literal["paper", "rod"] = "paper"
+    model: Literal["paper", "rod"] = "rod"
     cables: tuple[Cable, ...] = ()
     torsion_ratio: float | tuple[float, ...] = 0.77
     segment_rigidity: tuple[float, ...] | None = None

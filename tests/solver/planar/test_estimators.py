@@ -267,6 +267,6 @@ def test_median_errors_with_unknown_rigidity_and_noise():
     ],
 )
 def test_mistakes_are_named(call, error, words):
-    state = pulled(replace(Robot.prototype(), model="rod"), SCENES[0], 6.0)
+    state = pulled(replace(Robot.prototype(model="paper"), model="rod"), SCENES[0], 6.0)
     with pytest.raises(error, match=words):
         call(state)

@@ -56,8 +56,10 @@ def test_robot(change, message):
 
 
 def test_numbers_of_numpy_are_numbers():
-    given = Robot(length_mm=np.float32(180), segments=np.int64(18), offset_mm=np.int32(8), between=np.uint8(2))
-    assert given == replace(Robot.prototype(), between=2)
+    given = Robot(
+        model="paper", length_mm=np.float32(180), segments=np.int64(18), offset_mm=np.int32(8), between=np.uint8(2)
+    )
+    assert given == replace(Robot.prototype(model="paper"), between=2)
     assert {type(value) for value in (given.length_mm, given.offset_mm)} == {float}
     assert {type(value) for value in (given.segments, given.between)} == {int}
     assert Circle(center=np.array([40, 100]), radius=np.int64(10)) == Circle(center=(40.0, 100.0), radius=10.0)

@@ -54,7 +54,7 @@ def test_robot(change, message):
 
 @pytest.mark.parametrize("angle", [math.pi / 6, math.pi / 2, 5 * math.pi / 6, -math.pi / 3])
 def test_angles_that_are_taken(angle):
-    assert SpatialRobot.prototype(angle=angle).angle == angle
+    assert SpatialRobot.prototype(model="paper", angle=angle).angle == angle
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_obstacle_of_a_solver(robot, obstacle, message):
 
 @pytest.mark.parametrize("solver", [SpatialSolver, SpatialReferenceSolver, lambda r, s: SpatialBatchSolver(r, 1, 0)])
 def test_what_a_solver_is_made_of(solver):
-    for robot in (None, Robot.prototype()):
+    for robot in (None, Robot.prototype(model="paper")):
         with pytest.raises(TypeError, match=r"robot is .*; it must be a SpatialRobot: robots of the plane are"):
             solver(robot, Scene())
 
