@@ -164,7 +164,7 @@ def test_far_obstacles_change_nothing(circles):
 @pytest.mark.parametrize("center", [(30, 120), (45, 150), (60, 110), (24, 70)])
 def test_a_thin_peg_does_not_slip_between_nodes(center, touch, circles, pulls, swept):
     peg = circles((*center, 0.5))
-    coarse = {"length_mm": 180.0, "segments": 10, "offset_mm": 8.0, "touch": touch}
+    coarse = {"model": "paper", "length_mm": 180.0, "segments": 10, "offset_mm": 8.0, "touch": touch}
     with pytest.raises(ValueError, match=r"radius 0.5 mm; it could slip between points .* between=(18|27) or more"):
         Solver(Robot(**coarse), peg)
     robot = Robot(**coarse, between=29)

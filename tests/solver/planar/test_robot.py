@@ -27,7 +27,10 @@ PROTOTYPE = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0}
         ({"segments": 18.0}, "segments is 18.0; it must be a whole number from 2 to 4096"),
         ({"max_cable_mm": -1.0}, "max_cable_mm is -1.0; it must be positive and finite"),
         ({"max_cable_mm": 200.0}, "max_cable_mm is 200.0; it must be below 180.0"),
-        ({"max_cable_mm": 110.0, "length_range_mm": (100, 200)}, "max_cable_mm is 110.0; it must be below 100.0"),
+        (
+            {"model": "paper", "max_cable_mm": 110.0, "length_range_mm": (100, 200)},
+            "max_cable_mm is 110.0; it must be below 100.0",
+        ),
         ({"model": "slack"}, "model is 'slack'; it must be one of paper, rod"),
         ({"length_range_mm": (0, 200)}, "a bound of length_range_mm is 0; it must be positive and finite"),
         ({"length_range_mm": (190, 200)}, r"length_mm is 180.0; it must lie in length_range_mm \(190.0, 200.0\)"),
