@@ -135,9 +135,9 @@ inline void require_command(const double* command, std::size_t cables) {
   require(command[cables] > 0, "a length, or that in the block of an equilibrium, is not positive");
 }
 
-// Refuses blocks that no robot can have: the kernel needs a finite command and a positive length.
+// Refuses blocks that no robot can have: the kernel needs a finite command, cables and then length as in the layout,
+// and a positive length.
 inline void require_sound(const BlockLayout& layout, const double* block) {
-  require(layout.length.offset == layout.cables.offset + layout.cables.size, "cables and length stand side by side");
   require_command(block + layout.cables.offset, layout.cables.size);
 }
 
