@@ -9,7 +9,7 @@ from solver.common.checks import check_clear, check_core, check_origin, check_sc
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import PLANE
-from solver.common.rod import check_cables, kernel_rod
+from solver.common.rod import bending_ratios, check_cables, kernel_rod
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
 from solver.planar.equilibrium import Equilibrium
@@ -143,10 +143,7 @@ def kernel_robot(robot: Robot) -> _kernel.Robot:
 
 
 def _kernel_rod(robot: Robot) -> _kernel.Rod:
-    stiffness = np.ones(robot.segments)
-    if robot.segment_rigidity is not None:
-        stiffness = np.array(robot.segment_rigidity) / robot.rigidity
-    return kernel_rod(robot, stiffness, np.broadcast_to(robot.precurvature, robot.segments))
+    return kernel_rod(robot, bending_ratios(robot), np.broadcast_to(robot.precurvature, robot.segments))
 
 
 def kernel_scene(robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:

@@ -12,7 +12,8 @@ from solver.common.implicit import respond
 from solver.common.scene import MAX_OBSTACLES
 from solver.common.validation import check_instance, check_whole
 from solver.spatial.equilibrium import SpatialEquilibrium
-from solver.spatial.formulation import MOTIONS, kkt_derivatives
+from solver.spatial.formulation import kkt_derivatives
+from solver.spatial.obstacle_terms import MOTIONS
 from solver.spatial.robot import sides
 
 
