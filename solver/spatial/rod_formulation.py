@@ -15,9 +15,9 @@ import numpy as np
 from solver.common.gap_laws import GapLaw
 from solver.common.loads import load_work
 from solver.common.node_problem import NodeProblem, norms
-from solver.common.rod import bending_ratios, full_cables
+from solver.common.rod import full_cables
 from solver.spatial.obstacle_terms import ObstacleSymbols, obstacle_terms, parameter_count
-from solver.spatial.robot import SpatialRobot
+from solver.spatial.robot import SpatialRobot, stiffness_ratios
 
 TERMS = 15  # of the power series: to the last digit for half a turn
 EQUALITIES = 9  # of a segment
@@ -89,9 +89,7 @@ def _shape(robot: SpatialRobot, unknowns: ca.MX) -> _Shape:
 def _energy(robot: SpatialRobot, shape: _Shape) -> ca.MX:
     """Return the elastic energy over B [rad²]."""
     strain = shape.turns - ca.DM(np.broadcast_to(robot.precurvature, (robot.segments, 3)).T)
-    bending = bending_ratios(robot)
-    stiffness = np.stack([bending, bending, bending * np.array(robot.torsion_ratio)])
-    return ca.dot(ca.DM(stiffness) * strain, strain)
+    return ca.dot(ca.DM(stiffness_ratios(robot).T) * strain, strain)
 
 
 def _work(robot: SpatialRobot, shape: _Shape, segment: ca.MX) -> ca.MX:

@@ -9,11 +9,11 @@ from solver.common.checks import check_clear, check_core, check_origin, check_sc
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import SPACE
-from solver.common.rod import bending_ratios, check_cables, kernel_rod
+from solver.common.rod import check_cables, kernel_rod
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
 from solver.spatial.equilibrium import SpatialEquilibrium
-from solver.spatial.robot import SpatialRobot
+from solver.spatial.robot import SpatialRobot, stiffness_ratios
 
 
 class SpatialCommandCheck:
@@ -132,9 +132,7 @@ def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
 
 
 def _kernel_rod(robot: SpatialRobot) -> _kernel.Rod:
-    bending = bending_ratios(robot)
-    stiffness = np.column_stack([bending, bending, bending * np.array(robot.torsion_ratio)])
-    return kernel_rod(robot, stiffness, np.broadcast_to(robot.precurvature, (robot.segments, 3)))
+    return kernel_rod(robot, stiffness_ratios(robot), np.broadcast_to(robot.precurvature, (robot.segments, 3)))
 
 
 def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:
