@@ -16,6 +16,7 @@ from solver.common.ipopt import (
     OPTIONS,
     RESOLUTION,
     SMALLEST_STEP,
+    UNIT,
     nlp_solver,
 )
 from solver.common.layout import Layout
@@ -63,15 +64,15 @@ class RodBranch:
         zeros = np.zeros(self._equalities)
         self._lower = np.concatenate([zeros, np.where(bounded, 0.0, -np.inf)])
         self._upper = np.concatenate([zeros, np.full(bounded.size, np.inf)])
+        self._unit = UNIT * robot.offset_mm
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
-        nlp = {
-            "x": problem.unknowns,
-            "p": problem.parameters,
-            "f": problem.objective / ANGLE_UNIT**2,
-            "g": constraints,
-        }
+        inputs = [problem.unknowns, problem.parameters]
+        self._constraints = ca.Function("constraints", inputs, [constraints])
+        values = ca.Function("values", inputs, [problem.objective / ANGLE_UNIT**2, constraints / self._unit])
+        unknowns = ca.MX.sym("unknowns", problem.unknowns.shape)
+        objective, constraints = values(self._unit * unknowns, problem.parameters)
+        nlp = {"x": unknowns, "p": problem.parameters, "f": objective, "g": constraints}
         self._nlp_solver = nlp_solver(nlp, OPTIONS)
-        self._constraints = ca.Function("constraints", [problem.unknowns, problem.parameters], [constraints])
 
     def rest(self, unstressed: np.ndarray) -> tuple[RodPoint, Status, int]:
         """Return the robot under its loads, which are raised from none at the shape where nothing strains it.
@@ -134,13 +135,13 @@ class RodBranch:
         """Return the solution part of the way to a command, ``None`` where IPOPT finds none or leaves the branch."""
         target = command if part == 1 else present.command + part * (command - present.command)
         solution = self._nlp_solver(
-            x0=present.unknowns,
-            lam_g0=present.multipliers / ANGLE_UNIT**2,
+            x0=present.unknowns / self._unit,
+            lam_g0=present.multipliers * self._unit / ANGLE_UNIT**2,
             p=self._parameters(target),
             lbg=self._lower,
             ubg=self._upper,
         )
-        unknowns, stats = solution["x"].full().ravel(), self._nlp_solver.stats()
+        unknowns, stats = self._unit * solution["x"].full().ravel(), self._nlp_solver.stats()
         moved = np.linalg.norm((unknowns - present.unknowns).reshape(-1, self._space), axis=1).max()
         allowed = self._robot.longest_mm * (MOVE_OFFSET + MOVE_SLOPE * self._distance(target - present.command))
         if not (stats["success"] and moved <= allowed):
@@ -149,7 +150,7 @@ class RodBranch:
         inactive = -multipliers < np.abs(values)  # left positive by the barrier
         inactive[: self._equalities] = False
         multipliers[inactive] = 0.0
-        return RodPoint(target, unknowns, multipliers * ANGLE_UNIT**2, int(stats["iter_count"]))
+        return RodPoint(target, unknowns, multipliers * ANGLE_UNIT**2 / self._unit, int(stats["iter_count"]))
 
     def _distance(self, change: np.ndarray) -> float:
         """Return the size of a change of command, in displacements of a cable [a]."""

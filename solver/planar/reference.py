@@ -10,7 +10,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.checks import check_core, check_rest, check_scene
 from solver.common.geometry import touchable_points
 from solver.common.ipopt import (
     INSERTION,
@@ -81,7 +81,7 @@ class ReferenceSolver(CommandCheck):
         check_core(robot, scene)
         self._rod = RodReference(robot, scene, self._touchable) if robot.model == "rod" else None
         self._rest = self._rod.rest() if self._rod else self._paper_rest()
-        check_clear(robot, scene, self._rest.gaps)
+        check_rest(self._rest)
 
     def rest(self) -> Equilibrium:
         """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solver import _kernel
-from solver.common.checks import check_clear, check_core, check_origin, check_scene
+from solver.common.checks import check_core, check_origin, check_rest, check_scene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import PLANE
@@ -65,7 +65,7 @@ class Solver(CommandCheck):
         block = np.empty(self._kernel.block_size)
         work = self._kernel.rest(robot.length_mm, block)
         self._rest = Equilibrium.solved(robot, scene, block, *work)
-        check_clear(robot, scene, self._rest.gaps)
+        check_rest(self._rest)
 
     def rest(self) -> Equilibrium:
         """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature.

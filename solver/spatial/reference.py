@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.checks import check_core, check_rest, check_scene
 from solver.common.geometry import touchable_points
 from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP, nlp_solver
 from solver.common.reference import write_contacts
@@ -40,7 +40,7 @@ class SpatialReferenceSolver(SpatialCommandCheck):
         self._touchable = touchable_points(robot, scene)
         self._rod = SpatialRodReference(robot, scene, self._touchable) if robot.model == "rod" else None
         self._rest = self._rod.rest() if self._rod else self._paper_rest()
-        check_clear(robot, scene, self._rest.gaps)
+        check_rest(self._rest)
 
     def _paper_rest(self) -> SpatialEquilibrium:
         problem = node_problem(self.robot, self.scene.laws, self.scene.mounted)
