@@ -128,7 +128,7 @@ class RodBranch:
     def _parameters(self, command: np.ndarray) -> list[float]:
         # Loads count by their work over the energy scale: a share of them is as if the robot were so much stiffer.
         rigidity = self._robot.rigidity / max(command[-1], LEAST_SHARE)
-        fixed = [self._robot.offset_mm] if self._space == 2 else []
+        fixed = [self._robot.offset_mm] if self._space == 2 else []  # which in the plane is a parameter
         return [*command[:-1], *fixed, rigidity, *self._scene.parameters]
 
     def _solve_part(self, present: RodPoint, command: np.ndarray, part: float) -> RodPoint | None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 from truth import robots
 from truth.recorded import RECORDED, approach, pulls_along, read_states
 
@@ -26,8 +27,10 @@ from solver import (
     Status,
     spatial,
 )
+from solver.planar.formulation import kkt_derivatives as planar_kkt
 from solver.planar.formulation import node_problem as planar_problem
 from solver.planar.formulation import robot_inequality_count
+from solver.spatial.formulation import kkt_derivatives as spatial_kkt
 from solver.spatial.formulation import node_problem as spatial_problem
 from solver.spatial.rod_formulation import rod_inequality_count
 
@@ -87,6 +90,17 @@ def certificate(equilibrium):
     return max(np.array(residuals) * [length, 1 / length, 1 / length, 1.0, length])
 
 
+def least_curvature(equilibrium):
+    """The least eigenvalue of the Lagrangian's Hessian on the motions that the active constraints leave, times a²."""
+    robot, scene = equilibrium.robot, equilibrium.scene
+    kkt = (planar_kkt if isinstance(robot, Robot) else spatial_kkt)(robot, scene.laws, scene.mounted)
+    unknowns, parameters, tensions, multipliers = equilibrium.node_solution()
+    slopes = kkt(unknowns, parameters, tensions, multipliers)[0].full()
+    hessian, equalities, inequalities = np.split(slopes, np.cumsum([unknowns.size, tensions.size]))
+    motions = null_space(np.vstack([equalities, inequalities[multipliers > 0]]))
+    return robot.offset_mm**2 * np.linalg.eigvalsh(motions.T @ hessian @ motions)[0]
+
+
 def pull(solver, steps=30, share=1.0):
     """Yield the states of a straight pull from rest to the displacements of the robot's kind."""
     equilibrium = solver.rest()
@@ -117,7 +131,20 @@ def test_recorded_states_are_certified(name):
         assert equilibrium.slacks_mm == pytest.approx(np.array(state["slack_mm"]), abs=1e-8 * sum(spec["segment_mm"]))
 
 
-@pytest.mark.parametrize("name", ["a04", "b02", "c02", "d02", "e04", "f00", "g02", "h02", "i00", "j00", "k00"])
+ONE_OF_EACH_FAMILY = pytest.mark.parametrize(
+    "name", ["a04", "b02", "c02", "d02", "e04", "f00", "g02", "h02", "i00", "j00", "k00"]
+)
+
+
+@ONE_OF_EACH_FAMILY
+def test_recorded_states_are_minima(name):
+    """No motion that keeps the taut cables and the contacts lowers the energy."""
+    robots.require(RECORDED[name]["spec"])
+    for _, equilibrium in read_states(RECORDED[name]):
+        assert least_curvature(equilibrium) > 1e-6
+
+
+@ONE_OF_EACH_FAMILY
 def test_reference_follows_the_recorded_paths(name):
     """One path of each family from rest, in steps that the reference solver divides by itself."""
     spec = robots.require(RECORDED[name]["spec"])
