@@ -10,7 +10,7 @@ from agents.environment import Environment, require_env
 from agents.policy import Observation, motor_actions, search, set_points
 from agents.tuned import NEWTON_GAIN
 from ccr_gym import FORCE_SCALE_N, ActionSpec, PrivilegedState
-from solver import Equilibrium, Sensitivity, sensitivity
+from solver import Equilibrium, sensitivity
 from solver.spatial import SpatialSensitivity, spatial_sensitivity
 
 PROBE_MM = 1e-3  # trial move of a finite difference
@@ -113,10 +113,10 @@ class NewtonController:
         equilibrium, target = self._env.get_wrapper_attr("equilibrium"), self._env.get_wrapper_attr("task").target
         counted = slice(None) if target is None else slice(target, target + 1)
         if isinstance(equilibrium, Equilibrium):
-            rows = [Sensitivity.CABLE, Sensitivity.LENGTH] if insertion else [Sensitivity.CABLE]
-            slopes = sensitivity(equilibrium).forces[rows]
+            actuated = len(equilibrium.robot.cables) + insertion  # the length follows the cables
+            slopes = sensitivity(equilibrium).forces[:actuated]
         else:
-            slopes = spatial_sensitivity(equilibrium).forces[SpatialSensitivity.CABLES]
+            slopes = spatial_sensitivity(equilibrium).forces[SpatialSensitivity.rows(equilibrium.robot).cables]
         return np.asarray(state.rigidity_ratio * slopes[:, counted].sum(axis=1))
 
     def _tried(self, state: PrivilegedState) -> np.ndarray:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from solver import Equilibrium, Sensitivity, force_true, sensitivity
+from solver import Equilibrium, force_true, sensitivity
 
 
 class _Context(torch.autograd.function.FunctionCtx):
@@ -52,7 +52,8 @@ class EquilibriumOutputs(torch.autograd.Function):
 
 def _is_reached(equilibrium: Equilibrium, row: int, value: float) -> bool:
     """Return whether the equilibrium has the commanded value; that of a stalled or blocked robot has not."""
-    reached = {Sensitivity.CABLE: equilibrium.cable_mm, Sensitivity.LENGTH: equilibrium.length_mm}.get(row, value)
+    commands = [*equilibrium.cables_mm, equilibrium.length_mm]  # the first rows of a sensitivity
+    reached = commands[row] if row < len(commands) else value
     return bool(np.isclose(reached, value, rtol=1e-6, atol=0))
 
 
@@ -62,7 +63,7 @@ def _is_differentiable(equilibrium: Equilibrium) -> bool:
 
 
 def differentiable(
-    values: torch.Tensor, equilibria: Sequence[Equilibrium], rows: Sequence[int] = (Sensitivity.CABLE,)
+    values: torch.Tensor, equilibria: Sequence[Equilibrium], rows: Sequence[int] = (0,)
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Return nodes, tensions and contact forces of a batch of equilibria, differentiable in the values behind them.
 
@@ -72,8 +73,8 @@ def differentiable(
     Args:
         values: The values each equilibrium was solved for, ``(b, k)`` on the CPU, or ``(b,)`` for one value each.
         equilibria: Results of a solver, with the same numbers of segments and of obstacles.
-        rows: What the values are: rows of a :class:`solver.Sensitivity`, such as the cable displacement, the commanded
-            length, or the position of an obstacle.
+        rows: What the values are: rows of a :class:`solver.Sensitivity`, such as the displacement of the first cable,
+            the commanded length, or the position of an obstacle, see :meth:`solver.Sensitivity.rows`.
 
     Returns:
         Nodes ``(b, n+1, 3)`` [mm, mm, rad], tensions ``(b,)`` [N], forces on the robot ``(b, m, 2)`` [N].

@@ -42,6 +42,15 @@ def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
             raise ValueError(f"{shown(obstacle)} overlaps the straight robot by {-own.min():.3g} mm at node {node}")
 
 
+def check_rest(rest: BaseEquilibrium[AnyRobot]) -> None:
+    """Check that no obstacle overlaps the robot at rest; one that its loads press it against is met to roundoff.
+
+    Raises:
+        ValueError: As :func:`check_clear`.
+    """
+    check_clear(rest.robot, rest.scene, np.where(rest.contact, 0.0, rest.gaps))
+
+
 def check_scene(robot: AnyRobot, kind: type, scene: Scene, space: int) -> None:
     """Check that robot and scene are of the solver's space, and in proportion to each other.
 

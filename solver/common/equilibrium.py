@@ -34,13 +34,13 @@ class Optimality(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Optimality residuals of an equilibrium in the paper's node coordinates (eq. 5 or 13), each zero if exact.
+    """Optimality residuals of an equilibrium in node coordinates (eq. 5 or 13, or the rod's), each zero if exact.
 
     Attributes:
         stationarity: Largest entry of the Lagrangian's gradient, equality multipliers by least squares [rad²/mm].
-        lengths: Largest violation of a backbone, cable or disk length [mm].
-        gaps: Deepest penetration, or how much too short a rod's cable is, at least 0 [mm].
-        complementarity: Largest product of a multiplier and its gap, or of the tension and the slack [rad²].
+        lengths: Largest violation of an equality: of a length of backbone, cable or disk, or of a rod's law [mm].
+        gaps: Deepest penetration, or how much too short a cable of a rod is, at least 0 [mm].
+        complementarity: Largest product of a multiplier and its gap, or of a tension and the slack [rad²].
         sign: Size of the most negative multiplier, at least 0 [rad²/mm].
     """
 
@@ -131,15 +131,19 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
 
     @property
     def objective(self) -> float:
-        """Sum of squared disk angles J [rad²]."""
+        """Sum of squared disk angles J; of a rod the elastic energy over ``energy_scale``, without loads [rad²]."""
         return float(self.block[self._layout.objective.at])
 
     @property
     def energy(self) -> float:
-        """Elastic energy of the robot and of the obstacles' springs [N·mm]."""
+        """Elastic energy of the robot and of the obstacles' springs, and the potential of the loads [N·mm].
+
+        The potential of a force F at x is −F·x, and of a moment M at the angle φ it is −M φ: zero at the base.
+        """
         springs = [obstacle.spring_matrix for obstacle in self.scene]
         moved = zip(self.displacements, springs, strict=True)
-        return self.energy_scale * self.objective + sum(float(d @ spring @ d) / 2 for d, spring in moved)
+        elastic = self.energy_scale * self.objective + sum(float(d @ spring @ d) / 2 for d, spring in moved)
+        return elastic - self._load_work()
 
     @property
     def energy_scale(self) -> float:
@@ -187,6 +191,10 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
     def points(self) -> np.ndarray:
         """The points that can touch, ``(p, k, d)`` [mm]."""
 
+    @abstractmethod
+    def _load_work(self) -> float:
+        """Return the work of the loads from the base to the shape, see :func:`~solver.common.loads.load_work`."""
+
     @property
     @abstractmethod
     def _layout(self) -> Layout:
@@ -222,7 +230,7 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
         return slope.ravel() - pushed, equality_slopes
 
     def residuals(self) -> Residuals:
-        """Recompute the optimality conditions of eq. 5 or 13 from the nodes and multipliers alone.
+        """Recompute the optimality conditions of the node-coordinate problem from the shape and multipliers alone.
 
         The derivatives are those of the node-coordinate problem, which shares nothing with the solver's reduced
         coordinates.

@@ -3,6 +3,7 @@
 import numpy as np
 
 from solver.common.robot import AnyRobot
+from solver.common.rod import AnyRod, full_cables
 from solver.common.scene import Scene
 
 
@@ -41,3 +42,17 @@ def touching_gaps(robot: AnyRobot, scene: Scene, points: np.ndarray) -> np.ndarr
     if all(obstacle.nodes is None for obstacle in scene):
         return gaps
     return np.where(touchable_points(robot, scene), gaps, np.inf)
+
+
+def slacks_mm(robot: AnyRod, length_mm: float, cables_mm: np.ndarray, holes: np.ndarray) -> np.ndarray:
+    """Return the excess length of each cable over its path through the disks, ``(c,)`` [mm].
+
+    Args:
+        robot: The robot.
+        length_mm: Length of its backbone [mm].
+        cables_mm: Displacements of the cables, ``(c,)`` [mm].
+        holes: Points of each cable on each disk, ``(c, n+1, d)`` [mm].
+    """
+    ends = np.array([cable.end for cable in full_cables(robot)])
+    paths = np.cumsum(np.linalg.norm(np.diff(holes, axis=1), axis=2), axis=1)
+    return np.asarray(length_mm * ends / robot.segments - cables_mm - paths[np.arange(len(ends)), ends - 1])

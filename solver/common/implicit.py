@@ -1,5 +1,6 @@
 """Sensitivities of an equilibrium by the implicit function theorem at its active set."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
@@ -7,7 +8,40 @@ import numpy as np
 
 from solver.common.equilibrium import BaseEquilibrium
 from solver.common.robot import AnyRobot
-from solver.common.validation import shown
+from solver.common.scene import MAX_OBSTACLES
+from solver.common.validation import check_whole, shown
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterRows:
+    """Where each parameter stands along the first axis of a sensitivity: cables, length, then the obstacles.
+
+    Attributes:
+        cable_count: Number of cables, in the paper's model of space of pairs of them.
+        motions: Number of motions of an obstacle.
+    """
+
+    cable_count: int
+    motions: int
+
+    @property
+    def cables(self) -> slice:
+        """Rows of the displacements of the cables."""
+        return slice(0, self.cable_count)
+
+    @property
+    def length(self) -> int:
+        """Row of the length of the backbone."""
+        return self.cable_count
+
+    def obstacle(self, index: int) -> slice:
+        """Return the rows of an obstacle: its shift, turn and growth.
+
+        Raises:
+            ValueError: If it is not the index of an obstacle.
+        """
+        start = self.cable_count + 1 + self.motions * check_whole("obstacle", index, 0, MAX_OBSTACLES - 1)
+        return slice(start, start + self.motions)
 
 
 class Response(NamedTuple):

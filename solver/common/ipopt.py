@@ -9,9 +9,11 @@ import casadi as ca
 
 LARGEST_STEP, SMALLEST_STEP = 0.03125, 0.00375  # of one solve, and of the last attempt [a]
 INSERTION = 11.25  # displacement that counts as much as an insertion by L [a]
+LOADING = 0.625  # displacement that counts as much as all of the loads [a]
 PRETENSION = 0.00625  # a touching robot is not slackened below it [a]
 SLACK = 1.25e-4  # below it a shear costs too little for IPOPT, and the robot is taken as free [a]
 ANGLE_UNIT = 0.02  # of the disk angles of a rod [rad]
+UNIT = 0.125  # of lengths of a rod, for which the tolerances below are [a]
 RESOLUTION = 1.25e-7  # to which the command at the tension limit is found [a]
 MOVE_OFFSET, MOVE_SLOPE = 0.0028, 0.71  # a node that moves farther than offset + slope·|step| has left the branch [L]
 

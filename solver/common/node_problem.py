@@ -1,4 +1,4 @@
-"""The node-coordinate problem (eq. 5 or 13) as a symbolic problem, and its derivatives."""
+"""The node-coordinate problem (eq. 5 or 13, or the rod's) as a symbolic problem, and its derivatives."""
 
 from typing import NamedTuple
 
@@ -8,16 +8,17 @@ from solver.common.gap_laws import GapLaw
 
 
 class NodeProblem(NamedTuple):
-    """Eq. 5 or 13 in node coordinates, symbolic; built by ``node_problem`` of the planar and spatial formulations.
+    """Problem in node coordinates, symbolic; built by ``node_problem`` of the planar and spatial formulations.
 
     Attributes:
-        unknowns: Points of backbone and cables at nodes 1…n, then displacements of the obstacles on springs [mm].
+        unknowns: Points of backbone and disks at nodes 1…n, then displacements of the obstacles on springs [mm].
         parameters: Cable displacements, length and robot constants, then the shapes of the obstacles, one after the
             other, then the stiffness of their springs.
-        objective: Sum of squared disk angles, and the energy of the springs over ``B = EI / 2 l0`` [rad²].
+        objective: Sum of squared disk angles, or elastic energy and potential of the loads of a rod over
+            ``B = EI / 2 l0``, and the energy of the springs over B [rad²].
         equalities: Zero when every segment has its shape [mm].
-        inequalities: Not negative [mm]: limits of the robot itself, if any, then the gap of every point that can touch,
-            except node 0, to every obstacle, ordered (obstacle, line, position).
+        inequalities: Not negative [mm]: of a rod the slack of each cable, then the gaps between its disks; then the gap
+            of every point that can touch, except node 0, to every obstacle, ordered (obstacle, line, position).
     """
 
     unknowns: ca.MX

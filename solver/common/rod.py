@@ -185,6 +185,13 @@ def full_cables(robot: AnyRod) -> tuple[Cable, ...]:
     return tuple(_full(robot, cable) for cable in robot.cables)
 
 
+def bending_ratios(robot: AnyRod) -> np.ndarray:
+    """Return EI of each segment over the robot's rigidity, ``(n,)``."""
+    if robot.segment_rigidity is None:
+        return np.ones(robot.segments)
+    return np.array(robot.segment_rigidity) / robot.rigidity
+
+
 def _check_side(name: str, angle: float) -> None:
     if abs(math.sin(angle)) > 1e-9:
         raise refusal(name, angle, "0 or π in the plane")

@@ -50,22 +50,20 @@ class ReferenceBatch(BatchSolver):
     """
 
     def _rest(self, robots: list[int]) -> None:
-        self.commands[robots] = 0.0
-        self.blocks[robots] = 0.0
-        self._move(robots)
+        for robot in robots:
+            self._keep(robot, self._reference(robot).rest())
 
     def _move(self, robots: list[int]) -> None:
         for robot in robots:
-            scene = self._scenes[robot]
-            assert scene is not None
-            reference = _reference(self.robot, scene)
-            (present,), wanted = self.layout.cables(self.blocks[robot]), float(self.commands[robot, 0])
-            if wanted == 0 and not present:
-                reached = reference.rest()
-            else:
-                reached = reference.step(self._equilibrium(robot), wanted)
-            self.blocks[robot] = reached.block
-            self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
+            wanted = self.commands[robot, :-1].tolist()
+            self._keep(robot, self._reference(robot).step(self._equilibrium(robot), wanted))
+
+    def _reference(self, robot: int) -> ReferenceSolver:
+        return _reference(self.robot, self.scene(robot))
+
+    def _keep(self, robot: int, reached: Equilibrium) -> None:
+        self.blocks[robot] = reached.block
+        self.statuses[robot], self.iterations[robot] = reached.status, reached.iterations
 
 
 @lru_cache(maxsize=64)

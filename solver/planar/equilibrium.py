@@ -7,8 +7,10 @@ import casadi as ca
 import numpy as np
 
 from solver.common.equilibrium import BaseEquilibrium
-from solver.common.geometry import subdivide
+from solver.common.geometry import slacks_mm, subdivide
 from solver.common.layout import Layout
+from solver.common.loads import load_work
+from solver.common.rod import full_cables
 from solver.planar.formulation import node_derivatives
 from solver.planar.layout import layout
 from solver.planar.robot import Robot
@@ -37,7 +39,7 @@ class Equilibrium(BaseEquilibrium[Robot]):
 
     @property
     def cable_mm(self) -> float:
-        """Cable displacement l, which differs from the command where the step stalled or was blocked [mm]."""
+        """Displacement l of the first cable, as commanded unless the step stalled or was blocked [mm]."""
         return float(self.block[self._layout.cables.at])
 
     @property
@@ -47,7 +49,7 @@ class Equilibrium(BaseEquilibrium[Robot]):
 
     @property
     def tension(self) -> float:
-        """Cable tension dE/dl along the branch [N]."""
+        """Tension dE/dl of the first cable along the branch [N]."""
         return float(self.block[self._layout.tensions.at])
 
     @property
@@ -63,13 +65,24 @@ class Equilibrium(BaseEquilibrium[Robot]):
 
     @property
     def cable_nodes(self) -> np.ndarray:
-        """Cable point on each disk, ``(n+1, 2)`` [mm]."""
-        return np.asarray(self.nodes[:, :2] + self.robot.offset_mm * self._layout.frames(self.block))
+        """Point of the first cable on each disk, ``(n+1, 2)`` [mm]."""
+        return np.asarray(self.pulled[0])
+
+    @property
+    def pulled(self) -> np.ndarray:
+        """Points of each cable on each disk, also on those beyond its end, ``(c, n+1, 2)`` [mm]."""
+        holes = np.array([cable.hole_mm[0] for cable in full_cables(self.robot)])
+        return np.asarray(self.nodes[:, :2] + holes[:, None, None] * self._layout.frames(self.block))
+
+    @property
+    def slacks_mm(self) -> np.ndarray:
+        """Excess length of each cable over its path through the disks, zero in the paper's model, ``(c,)`` [mm]."""
+        return slacks_mm(self.robot, self.length_mm, self.cables_mm, self.pulled)
 
     @property
     def slack_mm(self) -> float:
-        """Excess length of the cable over its path through the disks [mm]; zero unless a rod's cable is slack."""
-        return self.length_mm - self.cable_mm - float(np.hypot(*np.diff(self.cable_nodes, axis=0).T).sum())
+        """Excess length of the first cable over its path through the disks [mm]; zero unless a rod's cable is slack."""
+        return float(self.slacks_mm[0])
 
     @property
     def points(self) -> np.ndarray:
@@ -83,9 +96,8 @@ class Equilibrium(BaseEquilibrium[Robot]):
         if self.robot.model != "rod":
             return multipliers
         disks = self.disk_multipliers
-        return np.concatenate(
-            [[self.tension / self.energy_scale], np.maximum(disks, 0), np.maximum(-disks, 0), multipliers]
-        )
+        cables = self.tensions / self.energy_scale
+        return np.concatenate([cables, np.maximum(disks, 0), np.maximum(-disks, 0), multipliers])
 
     @property
     def disk_multipliers(self) -> np.ndarray:
@@ -116,9 +128,21 @@ class Equilibrium(BaseEquilibrium[Robot]):
 
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
         robot, mounts = self.robot, self.displacements[list(self.scene.mounted)]
-        parameters = [self.cable_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
-        unknowns = [self.nodes[1:, :2].ravel(), self.cable_nodes[1:].ravel(), mounts.ravel()]
+        parameters = [*self.cables_mm, self.length_mm, robot.offset_mm, robot.rigidity, *self.scene.parameters]
+        edges = self.nodes[1:, :2] + robot.offset_mm * self._layout.frames(self.block)[1:]
+        unknowns = [self.nodes[1:, :2].ravel(), edges.ravel(), mounts.ravel()]
         return np.concatenate(unknowns), np.array(parameters)
+
+    def _load_work(self) -> float:
+        nodes, disks, segment = self.nodes, self._layout.frames(self.block), self.length_mm / self.robot.segments
+        return float(
+            load_work(
+                self.robot,
+                segment,
+                lambda node, place: nodes[node, :2] + place[0] * disks[node],
+                lambda node: nodes[node, 2],
+            )
+        )
 
 
 def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:

@@ -13,7 +13,6 @@ The build turns the first two into C, with their derivatives (:mod:`solver.codeg
 
 import itertools
 from functools import lru_cache
-from typing import NamedTuple
 
 import casadi as ca
 
@@ -31,6 +30,9 @@ from solver.common.gap_laws import (
 )
 from solver.common.node_problem import NodeProblem, first_derivatives, grow, norms, second_derivatives, subdivide
 from solver.planar.robot import Robot
+from solver.planar.rod_formulation import Pose, pose, rod_inequality_count, rod_objective, rod_segments
+
+MOTIONS = 4  # components of an obstacle's change: shift, turn, growth
 
 
 def segment_half_sine(sine: ca.SX, pull: ca.SX, length: ca.SX, offset: ca.SX) -> ca.SX:
@@ -185,43 +187,45 @@ def node_problem(
     The arccosine of eq. 4 is written as an arctangent of the same disk directions, which is smooth at zero.
 
     Args:
-        robot: The robot.
+        robot: The robot, with c cables.
         laws: Gap laws of the obstacles.
         mounted: Which obstacles are on springs.
-        change: Change of (l, L0), then of each obstacle its motion (x, y, turn about the origin, growth), ``(2 + 4m,)``
-            [mm, rad]; ``None`` for none.
+        change: Change of (l of each cable, L0), then of each obstacle its motion (x, y, turn about the origin, growth),
+            ``(c + 1 + 4m,)`` [mm, rad]; ``None`` for none.
 
     Returns:
-        The problem. ``unknowns``: backbone then cable points of nodes 1…n, then the displacements of the obstacles on
-        springs, each as x, y pairs, ``(4n + 2s,)`` [mm]. ``parameters``: ``(l, L0, a, EI)``, the shapes of the
-        obstacles, one after the other, and ``(kxx, kxy, kyy)`` of those on springs. ``equalities``: three for each
-        segment, ``(3n,)`` [mm]; see :func:`_paper_segments` and :func:`_rod_segments`. ``inequalities``: those of the
+        The problem. ``unknowns``: backbone points of nodes 1…n, then the points of their disks at the distance a
+        towards +x, then the displacements of the obstacles on springs, each as x, y pairs, ``(4n + 2s,)`` [mm].
+        ``parameters``: ``(l of each cable, L0, a, EI)``, the shapes of the obstacles, one after the other, and
+        ``(kxx, kxy, kyy)`` of those on springs. ``equalities``: three for each segment, ``(3n,)`` [mm]; see
+        :func:`_paper_segments` and :func:`~solver.planar.rod_formulation.rod_segments`. ``inequalities``: those of the
         robot, see :func:`robot_inequality_count`, then the gaps to obstacles [mm].
     """
-    n = robot.segments
+    n, cables = robot.segments, len(robot.cables)
     unknowns = ca.MX.sym("unknowns", 4 * n + 2 * sum(mounted))
-    starts = list(itertools.accumulate((law.size for law in laws), initial=4))
+    starts = list(itertools.accumulate((law.size for law in laws), initial=cables + 3))
     parameters = ca.MX.sym("parameters", starts[-1] + 3 * sum(mounted))
-    pull, total, offset = parameters[0], parameters[1], parameters[2]
-    if change is not None:
-        pull, total = pull + change[0], total + change[1]
-    pose = _pose(unknowns[: 4 * n], offset)
-    segments = _rod_segments if robot.model == "rod" else _paper_segments
-    equalities, limits = segments(robot, pose, pull, total, offset)
+    commands = parameters[: cables + 1] if change is None else parameters[: cables + 1] + change[: cables + 1]
+    pulls, total, offset = commands[:cables], commands[cables], parameters[cables + 1]
+    shape_now = pose(unknowns[: 4 * n], offset)
+    segments = rod_segments if robot.model == "rod" else _paper_segments
+    equalities, limits = segments(robot, shape_now, pulls, total, offset)
     displacements = ca.reshape(unknowns[4 * n :], 2, -1)
     springs = ca.reshape(parameters[starts[-1] :], 3, -1)
-    energy_scale = parameters[3] * n / (2 * total)
-    gaps, energy = [], ca.sumsqr(pose.angle)
+    energy_scale = parameters[cables + 2] * n / (2 * total)
+    is_rod = robot.model == "rod"
+    energy = rod_objective(robot, shape_now, total, energy_scale) if is_rod else ca.sumsqr(shape_now.angle)
+    gaps = []
     for j, law in enumerate(laws):
-        own = None if change is None else change[2 + 4 * j : 6 + 4 * j]
+        own = None if change is None else change[cables + 1 + MOTIONS * j : cables + 1 + MOTIONS * (j + 1)]
         shape, shift, turn = _moved(law, parameters[starts[j] : starts[j + 1]], own)
         if mounted[j]:
             mount = sum(mounted[:j])
             moved = displacements[:, mount]
             energy += _twice_spring_energy(springs[:, mount], moved) / (2 * energy_scale)
             shift = shift + moved
-        for line in robot.touch:
-            points = subdivide(pose.line(line), robot.between)[:, 1:]
+        for line in robot.lines_mm:
+            points = subdivide(shape_now.line(line / robot.offset_mm), robot.between)[:, 1:]
             gaps.append(gaps_of(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
     return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(limits, *gaps))
 
@@ -229,73 +233,19 @@ def node_problem(
 def robot_inequality_count(robot: Robot) -> int:
     """Return how many inequalities of the node problem come before the gaps to obstacles.
 
-    These are the slack of the rod's cable, then the gap between the disks of each segment on the cable's side, then on
-    the other; the paper's model has none.
+    These are the slack of each cable of the rod, then the gap between the disks of each segment on the side of +x, then
+    on the other; the paper's model has none.
     """
-    return 1 + 2 * robot.segments if robot.model == "rod" else 0
+    return rod_inequality_count(robot) if robot.model == "rod" else 0
 
 
-class _Pose(NamedTuple):
-    """Points of backbone and cable at nodes 0…n, the disks between them, and the angles of the segments."""
-
-    backbone: ca.MX
-    cable: ca.MX
-    disk: ca.MX
-    angle: ca.MX
-
-    def line(self, name: str) -> ca.MX:
-        """Return the points of a line that ``Robot.touch`` names."""
-        return {"backbone": self.backbone, "cable": self.cable, "rim": 2 * self.backbone - self.cable}[name]
-
-
-def _pose(points: ca.MX, offset: ca.MX) -> _Pose:
-    n = points.shape[0] // 4
-    backbone = ca.horzcat(ca.vertcat(0, 0), ca.reshape(points[: 2 * n], 2, n))
-    cable = ca.horzcat(ca.vertcat(offset, 0), ca.reshape(points[2 * n :], 2, n))
-    disk = cable - backbone
-    before, after = disk[:, :-1], disk[:, 1:]
-    sine = before[0, :] * after[1, :] - before[1, :] * after[0, :]
-    return _Pose(backbone, cable, disk, ca.atan2(sine, ca.sum1(before * after)))
-
-
-def _paper_segments(robot: Robot, pose: _Pose, pull: ca.MX, total: ca.MX, offset: ca.MX) -> tuple[ca.MX, ca.MX]:
+def _paper_segments(robot: Robot, shape: Pose, pull: ca.MX, total: ca.MX, offset: ca.MX) -> tuple[ca.MX, ca.MX]:
     """Return the equalities of the paper's segments: lengths of backbone, cable and disk minus their values."""
-    chords = norms(pose.backbone[:, 1:] - pose.backbone[:, :-1])
-    cables = norms(pose.cable[:, 1:] - pose.cable[:, :-1])
+    chords = norms(shape.backbone[:, 1:] - shape.backbone[:, :-1])
+    cables = norms(shape.edge[:, 1:] - shape.edge[:, :-1])
     share = (total - pull) / robot.segments
-    lengths = chords - total / robot.segments, cables - share, norms(pose.disk[:, 1:]) - offset
+    lengths = chords - total / robot.segments, cables - share, norms(shape.disk[:, 1:]) - offset
     return ca.horzcat(*lengths), ca.MX(0, 1)
-
-
-def _rod_segments(robot: Robot, pose: _Pose, pull: ca.MX, total: ca.MX, offset: ca.MX) -> tuple[ca.MX, ca.MX]:
-    """Return the equalities of the rod's segments, which are arcs, and the robot's own inequalities.
-
-    Equalities: length of the chord minus its value, component of the chord along the bisector of the disks, length of
-    the disk minus its value. Inequalities: slack of the cable, then the gaps between disks.
-    """
-    before, after = pose.disk[:, :-1], pose.disk[:, 1:]
-    chord = pose.backbone[:, 1:] - pose.backbone[:, :-1]
-    sinc, _ = sinc_and_cosine(pose.angle**2 / 4)
-    astride = ca.sum1(chord * (before + after)) / (2 * offset)
-    equalities = ca.horzcat(norms(chord) - total / robot.segments * sinc, astride, norms(after) - offset)
-    ahead = ca.vertcat(-before[1, :] - after[1, :], before[0, :] + after[0, :])  # across the bisector of the disks
-    ahead = ahead / ca.repmat(norms(ahead), 2, 1)
-    # The cable runs across the bisector; its length has no slope where the holes of two disks meet.
-    way = ca.sum2(ca.sum1((pose.cable[:, 1:] - pose.cable[:, :-1]) * ahead))
-    return equalities, ca.vertcat(total - pull - way, *_disk_gaps(robot, pose, ahead))
-
-
-def _disk_gaps(robot: Robot, pose: _Pose, ahead: ca.MX) -> list[ca.MX]:
-    """Return the gaps between the edges of consecutive disks, across their bisector, on each side [mm]."""
-    radius, thickness = robot.edge_mm, robot.disk_thickness_mm
-    assert radius is not None
-    half_cosine = norms(pose.disk[:, :-1] + pose.disk[:, 1:]) / (2 * robot.offset_mm)
-    gaps = []
-    for side in (1, -1):
-        edges = pose.backbone + side * radius / robot.offset_mm * pose.disk
-        apart = ca.sum1((edges[:, 1:] - edges[:, :-1]) * ahead)
-        gaps.append((apart - thickness * half_cosine).T)
-    return gaps
 
 
 def _moved(law: GapLaw, shape: ca.MX, change: ca.MX | None) -> tuple[ca.MX, ca.MX, ca.MX]:
@@ -323,5 +273,5 @@ def node_derivatives(robot: Robot, laws: tuple[GapLaw, ...], mounted: tuple[bool
 @lru_cache(maxsize=32)
 def kkt_derivatives(robot: Robot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Return the :func:`~solver.common.node_problem.second_derivatives` of :func:`node_problem`."""
-    change = ca.MX.sym("change", 2 + 4 * len(laws))
+    change = ca.MX.sym("change", len(robot.cables) + 1 + MOTIONS * len(laws))
     return second_derivatives(node_problem(robot, laws, mounted, change), change)

@@ -1,18 +1,18 @@
-"""Reference solver: eq. 4 and 5 in the node coordinates of the paper, solved by IPOPT through CasADi.
+"""Reference solver: eq. 4 and 5, or the rod's problem, in node coordinates, solved by IPOPT through CasADi.
 
 It shares the statement of the problem with :class:`solver.Solver`, but neither coordinates nor algorithm, and is about
 a thousand times slower. Tests compare the two.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.checks import check_core, check_rest, check_scene
 from solver.common.geometry import touchable_points
 from solver.common.ipopt import (
-    ANGLE_UNIT,
     INSERTION,
     LARGEST_STEP,
     MOVE_OFFSET,
@@ -24,14 +24,16 @@ from solver.common.ipopt import (
     SMALLEST_STEP,
     nlp_solver,
 )
+from solver.common.reference import write_contacts
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.planar.equilibrium import Equilibrium, touching_points
 from solver.planar.forces import onset_tension
-from solver.planar.formulation import node_derivatives, node_problem, robot_inequality_count
-from solver.planar.free import free_angle, free_tension, tip_slopes
+from solver.planar.formulation import node_derivatives, node_problem
+from solver.planar.free import tip_slopes
 from solver.planar.layout import layout
 from solver.planar.robot import Robot
+from solver.planar.rod_reference import RodReference
 from solver.planar.solve import CommandCheck
 
 
@@ -46,13 +48,13 @@ class _Point(NamedTuple):
 
 
 class _Pose(NamedTuple):
-    """A shape: points of nodes 0…n, angles of their disks, turns of the segments and their reduced coordinates."""
+    """A shape: points of nodes 0…n, angles of their disks, turns of the segments and sines of their shear angles."""
 
     backbone: np.ndarray
     cable: np.ndarray
     angles: np.ndarray
     turns: np.ndarray
-    coordinates: np.ndarray
+    sines: np.ndarray
 
 
 class ReferenceSolver(CommandCheck):
@@ -77,22 +79,23 @@ class ReferenceSolver(CommandCheck):
         self.scene = scene
         self._touchable = touchable_points(robot, scene)
         check_core(robot, scene)
-        self._is_rod = robot.model == "rod"
-        self._robot_inequalities = robot_inequality_count(robot)
-        self._build()
-        self._rest = self._equilibrium(self._free(0.0, robot.length_mm), Status.CONVERGED, 0)
-        check_clear(robot, scene, self._rest.gaps)
+        self._rod = RodReference(robot, scene, self._touchable) if robot.model == "rod" else None
+        self._rest = self._rod.rest() if self._rod else self._paper_rest()
+        check_rest(self._rest)
 
     def rest(self) -> Equilibrium:
-        """Return the straight, unactuated robot."""
+        """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature."""
         return self._rest
 
-    def step(self, equilibrium: Equilibrium, cable_mm: float, length_mm: float | None = None) -> Equilibrium:
-        """Move cable and base along the branch, as far as the tension allows.
+    def step(
+        self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None
+    ) -> Equilibrium:
+        """Move cables and base along the branch, as far as the tension allows; of several cables none moves beyond.
 
         Args:
             equilibrium: State to start from, of this solver or a :class:`solver.Solver` of an equal robot and scene.
-            cable_mm: Commanded cable displacement, 0 to ``robot.max_cable_mm`` [mm].
+            cable_mm: Commanded cable displacement, of several cables one each, from ``robot.least_cable_mm`` to
+                ``robot.max_cable_mm`` [mm].
             length_mm: Commanded length of the backbone [mm]; ``None`` keeps it.
 
         Returns:
@@ -101,7 +104,14 @@ class ReferenceSolver(CommandCheck):
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
-        cable_mm, length = self.check_command(equilibrium, cable_mm, length_mm)
+        command = self.check_command(equilibrium, cable_mm, length_mm)
+        return self._rod.step(equilibrium, command) if self._rod else self._paper_step(equilibrium, *command)
+
+    def _paper_rest(self) -> Equilibrium:
+        self._build()
+        return self._equilibrium(self._free(0.0, self.robot.length_mm), Status.CONVERGED, 0)
+
+    def _paper_step(self, equilibrium: Equilibrium, cable_mm: float, length: float) -> Equilibrium:
         present, iterations, largest = self._start(equilibrium), 0, LARGEST_STEP
         while (distance := self._distance(present, cable := self._goal(present, cable_mm), length)) > 0:
             part = min(1.0, largest / distance)
@@ -130,15 +140,15 @@ class ReferenceSolver(CommandCheck):
         problem = node_problem(self.robot, self.scene.laws, self.scene.mounted)
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
         # Angles are in units of the free robot's segment angle, so that the tolerances mean the same at every
-        # displacement; not so for a rod, which obstacles also bend without any displacement.
-        unit = ANGLE_UNIT if self._is_rod else problem.parameters[0] / (n * problem.parameters[2])
+        # displacement.
+        unit = problem.parameters[0] / (n * problem.parameters[2])
         nlp = {"x": problem.unknowns, "p": problem.parameters, "f": problem.objective / unit**2, "g": constraints}
         self._nlp_solver = nlp_solver(nlp, self._options, self._plugin)
         multipliers = ca.MX.sym("multipliers", constraints.shape[0])
         lagrangian = problem.objective + ca.dot(multipliers, constraints)
         slope = ca.gradient(lagrangian, problem.parameters)[0]
         self._cable_slope = ca.Function("cable_slope", [problem.unknowns, problem.parameters, multipliers], [slope])
-        bounded = np.concatenate([np.ones(self._robot_inequalities, bool), self._touchable[:, :, 1:].ravel()])
+        bounded = self._touchable[:, :, 1:].ravel()
         self._lower = np.concatenate([np.zeros(3 * n), np.where(bounded, 0.0, -np.inf)])
         self._upper = np.concatenate([np.zeros(3 * n), np.full(bounded.size, np.inf)])
 
@@ -146,39 +156,30 @@ class ReferenceSolver(CommandCheck):
         return [cable, length, self.robot.offset_mm, self.robot.rigidity, *self.scene.parameters]
 
     def _scale(self, cable: float) -> float:
-        return ANGLE_UNIT**2 if self._is_rod else (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
+        return (cable / (self.robot.segments * self.robot.offset_mm)) ** 2
 
     def _goal(self, point: _Point, cable: float) -> float:
-        """Return a command, in the paper's model at least the pretension while anything touches."""
-        touching = not self._is_rod and bool(self._pushing(point).any())
+        """Return a command, at least the pretension while anything touches."""
+        touching = bool(self._pushing(point).any())
         pretension = PRETENSION * self.robot.offset_mm
         return max(cable, min(point.cable, pretension)) if touching else cable
 
-    def _shape(self, cable: float, length: float, coordinates: np.ndarray) -> np.ndarray:
-        """Return the unknowns of a robot with given reduced coordinates: angles of arcs, or sines of shear angles."""
+    def _shape(self, cable: float, length: float, sines: np.ndarray) -> np.ndarray:
+        """Return the unknowns of a robot with given sines of its shear angles."""
         n, a, segment = self.robot.segments, self.robot.offset_mm, length / self.robot.segments
-        if self._is_rod:
-            turns, chords, shears = coordinates, segment * np.sinc(coordinates / (2 * np.pi)), np.zeros(n)
-        else:
-            sines = coordinates
-            rises = segment * np.sqrt(1 - sines**2) - np.sqrt((segment - cable / n) ** 2 - (segment * sines) ** 2)
-            turns, chords, shears = 2 * np.arcsin(rises / (2 * a)), np.full(n, segment), np.arcsin(sines)
+        rises = segment * np.sqrt(1 - sines**2) - np.sqrt((segment - cable / n) ** 2 - (segment * sines) ** 2)
+        turns = 2 * np.arcsin(rises / (2 * a))
         angles = np.concatenate([[0.0], -np.cumsum(turns)])
-        headings = angles[:-1] - turns / 2 + shears
-        backbone = np.cumsum(chords[:, None] * np.column_stack([-np.sin(headings), np.cos(headings)]), axis=0)
+        headings = angles[:-1] - turns / 2 + np.arcsin(sines)
+        backbone = np.cumsum(segment * np.column_stack([-np.sin(headings), np.cos(headings)]), axis=0)
         disks = a * np.column_stack([np.cos(angles), np.sin(angles)])
         return np.concatenate([backbone.ravel(), (backbone + disks[1:]).ravel()])
 
     def _free(self, cable: float, length: float) -> _Point:
         """Return the free robot, which nothing touches."""
-        robot = self.robot.at(length)
-        angle = free_angle(robot, cable) if self._is_rod else 0.0
-        straight = np.zeros(2 * sum(self.scene.mounted))
-        unknowns = np.r_[self._shape(cable, length, np.full(robot.segments, angle)), straight]
-        multipliers = np.zeros(self._robot_inequalities + self._touchable[:, :, 1:].size)
-        if self._is_rod:
-            multipliers[0] = free_tension(robot, cable) / robot.energy_scale
-        return self._balanced(cable, length, unknowns, multipliers)
+        mounts = np.zeros(2 * sum(self.scene.mounted))
+        unknowns = np.r_[self._shape(cable, length, np.zeros(self.robot.segments)), mounts]
+        return self._balanced(cable, length, unknowns, np.zeros(self._touchable[:, :, 1:].size))
 
     def _balanced(self, cable: float, length: float, unknowns: np.ndarray, multipliers: np.ndarray) -> _Point:
         """Return a shape with the multipliers of its inequalities, and those of the equalities by least squares."""
@@ -196,10 +197,10 @@ class ReferenceSolver(CommandCheck):
 
     def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
         """Return the solution for another command, ``None`` where IPOPT does not converge or leaves the branch."""
-        if cable < SLACK * self.robot.offset_mm and not self._is_rod:
+        if cable < SLACK * self.robot.offset_mm:
             return self._free(cable, length)
         scale = self._scale(cable)
-        shape = self._shape(cable, length, self._pose(start.unknowns, start.length).coordinates)
+        shape = self._shape(cable, length, self._pose(start.unknowns, start.length).sines)
         guess = self._balanced(cable, length, np.r_[shape, self._mounts(start)], self._pushing(start))
         solution = self._nlp_solver(
             x0=guess.unknowns,
@@ -264,51 +265,28 @@ class ReferenceSolver(CommandCheck):
         unsheared = angles[:-1] - turns / 2
         sideways = -np.sum(segments * np.column_stack([np.cos(unsheared), np.sin(unsheared)]), axis=1)
         sines = sideways * self.robot.segments / length
-        return _Pose(backbone, cable, angles, turns, turns if self._is_rod else sines)
+        return _Pose(backbone, cable, angles, turns, sines)
 
     def _equilibrium(
         self, point: _Point, status: Status, iterations: int, before: Equilibrium | None = None
     ) -> Equilibrium:
         pose = self._pose(point.unknowns, point.length)
-        nodes = np.column_stack([pose.backbone, pose.angles])
-        multipliers = np.zeros(self._touchable.shape)
-        own, pushing = np.split(self._pushing(point), [self._robot_inequalities])
-        multipliers[:, :, 1:] = pushing.reshape(multipliers[:, :, 1:].shape)
-        displacements = np.zeros((len(self.scene), 2))
-        displacements[list(self.scene.mounted)] = self._mounts(point).reshape(-1, 2)
-        parts: list[np.ndarray | list[float]] = [
-            [point.cable, point.length, self._tension(point), np.sum(pose.turns**2)],
-            pose.coordinates,
-            nodes,
-            (pose.cable - pose.backbone) / self.robot.offset_mm,
-            multipliers,
-            self._gaps(nodes, displacements),
-            displacements,
-        ]
         fields = layout(self.robot, len(self.scene))
         block = np.zeros(fields.size)
-        numbers = np.concatenate([np.ravel(part) for part in parts])
-        block[: numbers.size] = numbers
-        points = touching_points(self.robot, nodes)
-        for j, obstacle in enumerate(self.scene):
-            normals = obstacle.normal_at(points - displacements[j])
-            energy_scale = self.robot.at(point.length).energy_scale
-            fields.forces(block)[j] = energy_scale * (multipliers[j, ..., None] * normals).sum(axis=(0, 1))
-        fields.force(block)[:] = fields.forces(block).sum(axis=0)
-        fields.clearance(block)[:] = fields.gaps(block).min(initial=np.inf)
-        fields.flags(block)[:] = (multipliers > 0).any(axis=0).ravel()
-        disks = own[1:].reshape(2, -1)
-        fields.disk_multipliers(block)[:] = disks[0] - disks[1]
-        fields.tip_slopes(block)[:] = tip_slopes(self.robot.at(point.length), point.cable)
+        fields.cables(block)[:], fields.length(block)[:] = point.cable, point.length
+        fields.tensions(block)[:], fields.objective(block)[:] = self._tension(point), np.sum(pose.turns**2)
+        fields.coordinates(block)[:] = pose.sines
+        fields.nodes(block)[:] = np.column_stack([pose.backbone, pose.angles])
+        fields.frames(block)[:] = (pose.cable - pose.backbone) / self.robot.offset_mm
+        multipliers = fields.multipliers(block)
+        multipliers[:, :, 1:] = self._pushing(point).reshape(multipliers[:, :, 1:].shape)
+        fields.displacements(block)[list(self.scene.mounted)] = self._mounts(point).reshape(-1, 2)
+        points, robot = touching_points(self.robot, fields.nodes(block)), self.robot.at(point.length)
+        write_contacts(block, fields, self.scene, self._touchable, points, robot.energy_scale)
+        fields.tip_slopes(block)[:] = tip_slopes(robot, point.cable)
         now = Equilibrium(self.robot, self.scene, block.copy(), status, iterations)
         fields.onset(block)[0] = 0.0 if before is None else onset_tension(before, now)
         return Equilibrium(self.robot, self.scene, block, status, iterations)
-
-    def _gaps(self, nodes: np.ndarray, displacements: np.ndarray) -> np.ndarray:
-        points = touching_points(self.robot, nodes)
-        moved = zip(self.scene, displacements, strict=True)
-        gaps = np.reshape([obstacle.gap(points - shift) for obstacle, shift in moved], self._touchable.shape)
-        return np.where(self._touchable, gaps, np.inf)
 
     def _distance(self, point: _Point, cable: float, length: float) -> float:
         """Return the distance of a command, in displacements of the cable [a]."""

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from solver import _kernel
-from solver.common.checks import check_clear, check_core, check_origin, check_scene
+from solver.common.checks import check_core, check_origin, check_rest, check_scene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import PLANE
-from solver.common.rod import check_cables, kernel_rod
+from solver.common.rod import bending_ratios, check_cables, kernel_rod
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
 from solver.planar.equilibrium import Equilibrium
@@ -65,7 +65,7 @@ class Solver(CommandCheck):
         block = np.empty(self._kernel.block_size)
         work = self._kernel.rest(robot.length_mm, block)
         self._rest = Equilibrium.solved(robot, scene, block, *work)
-        check_clear(robot, scene, self._rest.gaps)
+        check_rest(self._rest)
 
     def rest(self) -> Equilibrium:
         """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature.
@@ -143,10 +143,7 @@ def kernel_robot(robot: Robot) -> _kernel.Robot:
 
 
 def _kernel_rod(robot: Robot) -> _kernel.Rod:
-    stiffness = np.ones(robot.segments)
-    if robot.segment_rigidity is not None:
-        stiffness = np.array(robot.segment_rigidity) / robot.rigidity
-    return kernel_rod(robot, stiffness, np.broadcast_to(robot.precurvature, robot.segments))
+    return kernel_rod(robot, bending_ratios(robot), np.broadcast_to(robot.precurvature, robot.segments))
 
 
 def kernel_scene(robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:

@@ -7,8 +7,10 @@ import casadi as ca
 import numpy as np
 
 from solver.common.equilibrium import BaseEquilibrium
-from solver.common.geometry import subdivide
+from solver.common.geometry import slacks_mm, subdivide
 from solver.common.layout import SPACE, Layout, make_layout
+from solver.common.loads import load_work
+from solver.common.rod import full_cables
 from solver.spatial.formulation import node_derivatives
 from solver.spatial.robot import SpatialRobot, sides
 
@@ -26,17 +28,23 @@ class SpatialEquilibrium(BaseEquilibrium[SpatialRobot]):
 
     @property
     def cables_mm(self) -> np.ndarray:
-        """Signed displacements of both pairs of cables, as commanded unless stalled or blocked, ``(2,)`` [mm]."""
+        """Displacements, of the rod of each cable, else signed of both pairs, as commanded unless stalled or blocked.
+
+        Their shape is ``(c,)`` [mm].
+        """
         return self._layout.cables(self.block)
 
     @property
     def tensions(self) -> np.ndarray:
-        """Tension of the pulled cable of each pair, ``(2,)`` [N]."""
+        """Tension of each cable of the rod, else of the pulled cable of each pair, ``(c,)`` [N]."""
         return self._layout.tensions(self.block)
 
     @property
     def controls(self) -> np.ndarray:
-        """Shears and twist of each segment, ``(n, 3)``, as in :mod:`solver.spatial.formulation`."""
+        """Shears and twist of each segment, as in :mod:`solver.spatial.formulation`, ``(n, 3)``; of a rod rotations.
+
+        A rotation vector of a rod is its bending towards −y and +x, and its twist [rad].
+        """
         return self._layout.coordinates(self.block)
 
     @property
@@ -51,10 +59,38 @@ class SpatialEquilibrium(BaseEquilibrium[SpatialRobot]):
 
     @property
     def pulled(self) -> np.ndarray:
-        """Points of the pulled cable of each pair on each disk, ``(2, n+1, 3)`` [mm]."""
-        return np.asarray(
-            self.nodes + np.einsum("nij,kj->kni", self.frames, sides(self.cables_mm)[:, None] * self.robot.holes)
-        )
+        """Points of cables on each disk, ``(c, n+1, 3)`` [mm]: of the rod all, also on disks beyond their ends.
+
+        In the paper's model they are those of the pulled cable of each pair.
+        """
+        if self.robot.model == "rod":
+            holes = np.array([(*cable.hole_mm, 0.0) for cable in full_cables(self.robot)])
+        else:
+            holes = sides(self.cables_mm)[:, None] * self.robot.holes
+        return np.asarray(self.nodes + np.einsum("nij,kj->kni", self.frames, holes))
+
+    @property
+    def slacks_mm(self) -> np.ndarray:
+        """Excess length of each cable of the rod over its path through the disks, ``(c,)`` [mm].
+
+        In the paper's model, whose cables have no slack, it is zero.
+        """
+        if self.robot.model == "paper":
+            return np.zeros(len(self.cables_mm))
+        return slacks_mm(self.robot, self.length_mm, self.cables_mm, self.pulled)
+
+    @property
+    def inequality_multipliers(self) -> np.ndarray:
+        """Multipliers of the inequalities of :func:`solver.spatial.formulation.node_problem`, ``(k,)`` [rad²/mm]."""
+        multipliers = self.multipliers[:, :, 1:].ravel()
+        if self.robot.model == "paper":
+            return multipliers
+        return np.concatenate([self.tensions / self.energy_scale, self.disk_multipliers, multipliers])
+
+    @property
+    def disk_multipliers(self) -> np.ndarray:
+        """Multiplier of the contact between the disks of each segment, ``(n,)`` for a rod, else ``(0,)`` [rad²/mm]."""
+        return self._layout.disk_multipliers(self.block)
 
     @property
     def points(self) -> np.ndarray:
@@ -86,8 +122,19 @@ class SpatialEquilibrium(BaseEquilibrium[SpatialRobot]):
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
         mounts = self.displacements[list(self.scene.mounted)]
         parameters = [*self.cables_mm, self.length_mm, self.robot.rigidity, *self.scene.parameters]
-        unknowns = [self.nodes[1:].ravel(), self.pulled[:, 1:].ravel(), mounts.ravel()]
+        unknowns = [self.nodes[1:].ravel(), *self._disk_unknowns(), mounts.ravel()]
         return np.concatenate(unknowns), np.array(parameters)
+
+    def _disk_unknowns(self) -> list[np.ndarray]:
+        """Return what the node-coordinate problem knows of the disks: holes, or of a rod edges and rotation vectors."""
+        if self.robot.model == "paper":
+            return [self.pulled[:, 1:].ravel()]
+        edges = self.nodes[1:] + self.robot.offset_mm * np.moveaxis(self.frames[1:, :, :2], 2, 0)
+        return [edges.ravel(), self.robot.offset_mm * self.controls.ravel()]
+
+    def _load_work(self) -> float:
+        nodes, frames, segment = self.nodes, self.frames, self.robot.segment_mm
+        return float(load_work(self.robot, segment, lambda node, at: nodes[node] + frames[node][:, :2] @ at))
 
 
 def touching_points(robot: SpatialRobot, nodes: np.ndarray, frames: np.ndarray) -> np.ndarray:

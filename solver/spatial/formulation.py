@@ -12,13 +12,14 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from solver.common.gap_laws import TINY, GapLaw, capsule_gap, circle_gap, gaps_of, half_plane_gap
-from solver.common.node_problem import NodeProblem, first_derivatives, grow, norms, second_derivatives, subdivide
+from solver.common.gap_laws import TINY, GapLaw, capsule_gap, circle_gap, half_plane_gap
+from solver.common.node_problem import NodeProblem, first_derivatives, norms, second_derivatives
+from solver.spatial.obstacle_terms import MOTIONS, ObstacleSymbols, obstacle_terms, parameter_count
 from solver.spatial.robot import SpatialRobot
+from solver.spatial.rod_formulation import rod_node_problem
 
 # Halvings of an angle, and terms of the power series of its square: exact to the last digit for a quarter turn.
 HALVINGS, SERIES_TERMS = 2, 12
-MOTIONS = 7  # components of an obstacle's change: shift, turns, growth
 
 
 def cylinder_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
@@ -185,7 +186,7 @@ def _inverse(matrix: ca.SX) -> ca.SX:
 def node_problem(
     robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...], change: ca.MX | None = None
 ) -> NodeProblem:
-    """Build eq. 13 for a robot and obstacles of given kinds.
+    """Build eq. 13 for a robot and obstacles of given kinds; for a rod :func:`.rod_formulation.rod_node_problem`.
 
     The first cable lies on the side of the first hole where its displacement is positive, else opposite; so does the
     second. A hole below is always that of the cable that is pulled.
@@ -205,33 +206,21 @@ def node_problem(
         springs over ``B = EI / 2 l0`` [rad²]. ``equalities``: zero when lengths of backbone, cables and disks, and the
         angle between the holes, are as given, ``(6n,)`` [mm]. ``inequalities``: gaps to obstacles [mm].
     """
+    if robot.model == "rod":
+        return rod_node_problem(robot, laws, mounted, change)
     n = robot.segments
     unknowns = ca.MX.sym("unknowns", 9 * n + 3 * sum(mounted))
-    sizes = [law.size for law in laws]
-    parameters = ca.MX.sym("parameters", 4 + sum(sizes) + 6 * sum(mounted))
-    shapes = ca.vertsplit(parameters[4 : 4 + sum(sizes)], [0, *(sum(sizes[: j + 1]) for j in range(len(sizes)))])
-    springs = ca.reshape(parameters[4 + sum(sizes) :], 6, -1)
+    parameters = ca.MX.sym("parameters", 4 + parameter_count(laws, mounted))
     commands = parameters[:3] if change is None else parameters[:3] + change[:3]
-    total = commands[2]
     signs = [ca.if_else(parameters[k] < 0, -1.0, 1.0) for k in range(2)]
     pose = _pose(robot, unknowns, signs)
-    displacements = ca.reshape(unknowns[9 * n :], 3, -1)
-    energy = ca.sum2(_square_angles(pose.disks[0], robot.offset_mm))
-    energy += ca.sum2(_square_angles(pose.disks[1], robot.offset_mm))
-    gaps = []
-    for j, law in enumerate(laws):
-        own = None if change is None else change[3 + MOTIONS * j : 3 + MOTIONS * (j + 1)]
-        shape, shift, turn = _moved(law, shapes[j], own)
-        if mounted[j]:
-            mount = sum(mounted[:j])
-            moved = displacements[:, mount]
-            energy += _twice_spring_energy(springs[:, mount], moved) / (parameters[3] * n / total)
-            shift = shift + moved
-        for line in pose.touching_lines(robot):
-            points = subdivide(line, robot.between)[:, 1:]
-            gaps.append(gaps_of(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
-    inequalities = ca.vertcat(*gaps) if gaps else ca.MX(0, 1)
-    return NodeProblem(unknowns, parameters, energy, _equalities(robot, pose, signs, commands), inequalities)
+    moved = None if change is None else change[3:]
+    symbols = ObstacleSymbols(laws, mounted, unknowns[9 * n :], parameters[4:], moved)
+    energy_scale = parameters[3] * n / (2 * commands[2])
+    energy, gaps = obstacle_terms(symbols, pose.touching_lines(robot), robot.between, energy_scale)
+    for disk in pose.disks:
+        energy += ca.sum2(_square_angles(disk, robot.offset_mm))
+    return NodeProblem(unknowns, parameters, energy, _equalities(robot, pose, signs, commands), gaps)
 
 
 class _Pose(NamedTuple):
@@ -273,21 +262,6 @@ def _square_angles(disk: ca.MX, offset: float) -> ca.MX:
     return law(ca.sum1((disk[:, 1:] - disk[:, :-1]) ** 2) / (4 * offset**2))
 
 
-def _moved(law: GapLaw, shape: ca.MX, change: ca.MX | None) -> tuple[ca.MX, ca.MX, ca.MX]:
-    """Return the shape, shift and rotation of an obstacle after a change of its own, to second order in the turns."""
-    if change is None:
-        return shape, ca.MX.zeros(3), ca.MX.eye(3)
-    turns = ca.skew(change[3:6])
-    return grow(law, shape, change[6]), change[:3], ca.MX.eye(3) + turns + turns @ turns / 2
-
-
-def _twice_spring_energy(spring: ca.MX, moved: ca.MX) -> ca.MX:
-    """Return twice the energy of a spring, given by its six upper entries [N·mm]."""
-    xx, xy, xz, yy, yz, zz = ca.vertsplit(spring)
-    matrix = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
-    return ca.dot(moved, matrix @ moved)
-
-
 @lru_cache(maxsize=32)
 def node_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Return the :func:`~solver.common.node_problem.first_derivatives` of :func:`node_problem`."""
@@ -297,5 +271,5 @@ def node_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tup
 @lru_cache(maxsize=32)
 def kkt_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Return the :func:`~solver.common.node_problem.second_derivatives` of :func:`node_problem`."""
-    change = ca.MX.sym("change", 3 + MOTIONS * len(laws))
+    change = ca.MX.sym("change", len(robot.cables) + 1 + MOTIONS * len(laws))
     return second_derivatives(node_problem(robot, laws, mounted, change), change)

@@ -1,25 +1,29 @@
-"""Reference solver in space: eq. 13 in the node coordinates of the paper, solved by IPOPT through CasADi."""
+"""Reference solver in space: eq. 13, or the rod's problem, in node coordinates, solved by IPOPT through CasADi."""
 
 import math
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 
-from solver.common.checks import check_clear, check_core, check_scene
+from solver.common.checks import check_core, check_rest, check_scene
 from solver.common.geometry import touchable_points
 from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP, nlp_solver
+from solver.common.reference import write_contacts
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import node_problem
 from solver.spatial.robot import SpatialRobot, sides
+from solver.spatial.rod_reference import SpatialRodReference
 from solver.spatial.solve import SpatialCommandCheck
 
 
 class SpatialReferenceSolver(SpatialCommandCheck):
     """Follows the equilibria of :class:`solver.spatial.SpatialSolver`, by solving the problem as the paper states it.
 
-    It only follows a branch: where the branch ends, a step is ``GAVE_UP``. Tensions are reported, but not limited.
+    It only follows a branch: where the branch ends, a step is ``GAVE_UP``. Tensions of the paper's model are reported,
+    but not limited.
 
     Args:
         robot: The robot.
@@ -34,7 +38,12 @@ class SpatialReferenceSolver(SpatialCommandCheck):
         self.robot, self.scene = robot, scene
         check_core(robot, scene)
         self._touchable = touchable_points(robot, scene)
-        problem = node_problem(robot, scene.laws, scene.mounted)
+        self._rod = SpatialRodReference(robot, scene, self._touchable) if robot.model == "rod" else None
+        self._rest = self._rod.rest() if self._rod else self._paper_rest()
+        check_rest(self._rest)
+
+    def _paper_rest(self) -> SpatialEquilibrium:
+        problem = node_problem(self.robot, self.scene.laws, self.scene.mounted)
         self._equalities = problem.equalities.shape[0]
         constraints = ca.vertcat(problem.equalities, problem.inequalities)
         nlp = {
@@ -47,27 +56,31 @@ class SpatialReferenceSolver(SpatialCommandCheck):
         multipliers = ca.MX.sym("multipliers", constraints.shape[0])
         slopes = ca.gradient(problem.objective + ca.dot(multipliers, constraints), problem.parameters)[:2]
         self._cable_slopes = ca.Function("slopes", [problem.unknowns, problem.parameters, multipliers], [slopes])
-        self._rest = self._free(np.zeros(2))
-        check_clear(robot, scene, self._rest.gaps)
+        return self._free(np.zeros(2))
 
     def rest(self) -> SpatialEquilibrium:
-        """Return the straight, unactuated robot."""
+        """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature."""
         return self._rest
 
-    def step(self, equilibrium: SpatialEquilibrium, cables_mm: tuple[float, float] | np.ndarray) -> SpatialEquilibrium:
-        """Move both pairs of cables evenly to displacements, along the branch.
+    def step(self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray) -> SpatialEquilibrium:
+        """Move the cables evenly to displacements, along the branch; of a rod none moves beyond a tension limit.
 
         Args:
             equilibrium: State to start from, of this solver or one of an equal robot and scene.
-            cables_mm: Displacement of each pair, within ±``robot.max_cable_mm`` [mm].
+            cables_mm: Displacement of each cable, in the paper's model of each pair, within ±``robot.max_cable_mm``
+                [mm].
 
         Returns:
-            The equilibrium reached: ``CONVERGED``, or ``GAVE_UP`` with the one given.
+            The equilibrium reached: ``CONVERGED``, of a rod ``STALLED`` at the limit, or ``GAVE_UP`` with the one
+            given.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
         """
-        target = np.array(self.check_command(equilibrium, cables_mm))
+        command = self.check_command(equilibrium, cables_mm)
+        return self._rod.step(equilibrium, command) if self._rod else self._paper_step(equilibrium, np.array(command))
+
+    def _paper_step(self, equilibrium: SpatialEquilibrium, target: np.ndarray) -> SpatialEquilibrium:
         offset = self.robot.offset_mm
         now, largest, smallest = equilibrium, LARGEST_STEP * offset, SMALLEST_STEP * offset
         while (distance := np.abs(target - now.cables_mm).max()) > 0:
@@ -170,13 +183,7 @@ class SpatialReferenceSolver(SpatialCommandCheck):
             fields.multipliers(block)[:, :, 1:] = multipliers.reshape(self._touchable[:, :, 1:].shape)
             fields.displacements(block)[list(self.scene.mounted)] = mounts.reshape(-1, 3)
         points = touching_points(self.robot, nodes, frames)
-        for j, (obstacle, moved) in enumerate(zip(self.scene, fields.displacements(block), strict=True)):
-            fields.gaps(block)[j] = np.where(self._touchable[j], obstacle.gap(points - moved), np.inf)
-            pushed = fields.multipliers(block)[j, ..., None] * obstacle.normal_at(points - moved)
-            fields.forces(block)[j] = self.robot.energy_scale * pushed.sum(axis=(0, 1))
-        fields.force(block)[:] = fields.forces(block).sum(axis=0)
-        fields.clearance(block)[:] = fields.gaps(block).min(initial=np.inf)
-        fields.flags(block)[:] = (fields.multipliers(block) > 0).any(axis=0).ravel()
+        write_contacts(block, fields, self.scene, self._touchable, points, self.robot.energy_scale)
         angles = [_angles(frames @ hole / self.robot.offset_mm) for hole in self.robot.holes]
         fields.objective(block)[:] = np.sum(np.square(angles))
         return SpatialEquilibrium(self.robot, self.scene, block, Status.CONVERGED, iterations)

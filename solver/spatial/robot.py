@@ -17,7 +17,7 @@ from solver.common.robot import (
     longest_arc_edge,
     widest_bend,
 )
-from solver.common.rod import Cable, Load, check_rod, checked_rotations, full_cables
+from solver.common.rod import Cable, Load, bending_ratios, check_rod, checked_rotations, full_cables
 from solver.common.validation import check_finite, check_number, check_sequence, check_whole, is_listed, refusal
 
 LINES = ("backbone", "holes", "rim")
@@ -28,6 +28,12 @@ LEAST_SINE = math.sin(math.radians(30) - 1e-9)  # of the angle between the cable
 def sides(cables_mm: np.ndarray) -> np.ndarray:
     """Return which cable of each pair is pulled: 1 for the first one, −1 for the one opposite to it."""
     return np.where(cables_mm < 0, -1.0, 1.0)
+
+
+def stiffness_ratios(robot: "SpatialRobot") -> np.ndarray:
+    """Return EI, twice, and GJ of each segment of a rod over the robot's rigidity, ``(n, 3)``."""
+    bending = bending_ratios(robot)
+    return np.column_stack([bending, bending, bending * np.array(robot.torsion_ratio)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

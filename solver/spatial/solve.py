@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solver import _kernel
-from solver.common.checks import check_clear, check_core, check_origin, check_scene
+from solver.common.checks import check_core, check_origin, check_rest, check_scene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles
 from solver.common.layout import SPACE
@@ -13,7 +13,7 @@ from solver.common.rod import check_cables, kernel_rod
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
 from solver.spatial.equilibrium import SpatialEquilibrium
-from solver.spatial.robot import SpatialRobot
+from solver.spatial.robot import SpatialRobot, stiffness_ratios
 
 
 class SpatialCommandCheck:
@@ -60,7 +60,7 @@ class SpatialSolver(SpatialCommandCheck):
         block = np.empty(self._kernel.block_size)
         work = self._kernel.rest(robot.length_mm, block)
         self._rest = SpatialEquilibrium.solved(robot, scene, block, *work)
-        check_clear(robot, scene, self._rest.gaps)
+        check_rest(self._rest)
 
     def rest(self) -> SpatialEquilibrium:
         """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature.
@@ -132,11 +132,7 @@ def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
 
 
 def _kernel_rod(robot: SpatialRobot) -> _kernel.Rod:
-    bending = np.ones(robot.segments)
-    if robot.segment_rigidity is not None:
-        bending = np.array(robot.segment_rigidity) / robot.rigidity
-    stiffness = np.column_stack([bending, bending, bending * np.array(robot.torsion_ratio)])
-    return kernel_rod(robot, stiffness, np.broadcast_to(robot.precurvature, (robot.segments, 3)))
+    return kernel_rod(robot, stiffness_ratios(robot), np.broadcast_to(robot.precurvature, (robot.segments, 3)))
 
 
 def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:

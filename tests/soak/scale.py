@@ -1,4 +1,4 @@
-"""Scaling law: lengths × s, rigidities × s² and springs × 1/s leave forces, tensions and angles unchanged."""
+"""Scaling law: lengths × s, rigidities × s², springs and weight per length × 1/s leave forces and angles unchanged."""
 
 from dataclasses import replace
 from functools import singledispatch
@@ -13,13 +13,16 @@ CABLE_POWERS = {
     "objective": 0,
     "nodes": None,  # points and, in the plane, angles
     "multipliers": -1,
+    "disk_multipliers": -1,
+    "cables_mm": 1,
+    "tensions": 0,
     "gaps": 1,
     "displacements": 1,
     "forces": 0,
     "length_mm": 1,
 }
 PLANAR_POWERS = {**CABLE_POWERS, "cable_mm": 1, "tension": 0, "shear": 0, "onset_tension": 0}
-SPATIAL_POWERS = {**CABLE_POWERS, "cables_mm": 1, "tensions": 0, "controls": 0, "frames": 0, "onset_tensions": 0}
+SPATIAL_POWERS = {**CABLE_POWERS, "controls": 0, "frames": 0, "onset_tensions": 0}
 
 
 def times(point, s):
@@ -35,9 +38,22 @@ def scale_robot(robot, s):
         "max_cable_mm": s * robot.max_cable_mm,
     }
     if isinstance(robot, Robot):
-        disks = {"disk_radius_mm": s * robot.edge_mm, "disk_thickness_mm": s * robot.disk_thickness_mm}
-        lengths |= disks | {"length_range_mm": times(robot.length_range_mm, s)}
-    return replace(robot, rigidity=s * s * robot.rigidity, **lengths)
+        lengths |= {"length_range_mm": times(robot.length_range_mm, s)}
+    if isinstance(robot, Robot) or robot.model == "rod":
+        lengths |= {"disk_radius_mm": s * robot.edge_mm, "disk_thickness_mm": s * robot.disk_thickness_mm}
+    rigidities = {"rigidity": s * s * robot.rigidity, "segment_rigidity": times(robot.segment_rigidity, s * s)}
+    return replace(robot, **lengths, **rigidities, **_rod_parts(robot, s))
+
+
+def _rod_parts(robot, s):
+    """Return cables and loads of a rod s times as large; none in the paper's model."""
+    if robot.model != "rod":
+        return {}
+    return {
+        "cables": tuple(replace(c, offset_mm=None if c.offset_mm is None else s * c.offset_mm) for c in robot.cables),
+        "weight_per_length": times(robot.weight_per_length, 1 / s),
+        "loads": tuple(replace(o, moment=s * o.moment, at=(s * o.at[0], o.at[1])) for o in robot.loads),
+    }
 
 
 def scale_scene(scene, s):

@@ -35,7 +35,8 @@ def test_gradients(solver):
 
 def test_gradients_in_every_command_and_the_place_of_an_obstacle():
     robot = Robot(length_mm=180, segments=18, offset_mm=8, model="rod", length_range_mm=(170, 190))
-    rows = (Sensitivity.CABLE, Sensitivity.LENGTH, Sensitivity.obstacle_rows(0).start)
+    parameters = Sensitivity.rows(robot)
+    rows = (0, parameters.length, parameters.obstacle(0).start)
 
     def solved(values):
         cable, length, x = values.tolist()

@@ -1,13 +1,17 @@
 """The scaling law: a robot, its obstacles and commands s times as large do the same, with the same forces."""
 
+import math
+
 import numpy as np
 import pytest
 from soak.scale import natural, scale_obstacle, scale_robot, scale_scene
-from soak.scenes import MODELS, OVAL, make_solver, sample_setting
-from soak.walks import replay, sample_increments, walk
+from soak.scenes import MODELS, OVAL, PLANAR_KINDS, SPATIAL_KINDS, make_solver, sample_setting
+from soak.walks import Walk, replay, sample_increments, walk
 
-from solver import Capsule, Circle, Custom, Ellipse, HalfPlane, Polygon, spatial
+from solver import Cable, Capsule, Circle, Custom, Ellipse, HalfPlane, Load, Polygon, Robot, Scene, spatial
+from solver.spatial import SpatialRobot
 
+LOADED = ("loaded rod", "loaded space rod")
 STEPS = 60
 EPISODES = 10  # of each model, times --soak over its default
 POWERS_OF_TWO = [2.0**k for k in (-10, -3, -1, 1, 3, 10)]
@@ -17,6 +21,8 @@ CLOSE = 1e-6  # of the robot's natural units
 
 def episode(model, index):
     """A solver at s = 1 and a walk in it."""
+    if model in LOADED:
+        return loaded_episode(model, index)
     generator = np.random.default_rng([15, MODELS.index(model), index])
     solver = sample_setting(generator, model, scales=(1.0,)).solver
     return solver, walk(solver, sample_increments(generator, solver, 1.0, STEPS))
@@ -24,9 +30,75 @@ def episode(model, index):
 
 def scaled(solver, commands, s):
     """States of the same walk, s times as large."""
-    robot = scale_robot(solver.robot, s)
+    large = make_solver(scale_robot(solver.robot, s), scale_scene(solver.scene, s))
     bounds = s * np.array([*(commands.shape[1] - 1) * [solver.robot.cable_limit_mm], np.inf])
-    return replay(make_solver(robot, scale_scene(solver.scene, s)), np.minimum(s * commands, bounds)).states
+    commands = np.clip(s * commands, -bounds, bounds)
+    return (follow if is_loaded(solver.robot) else lambda *walked: replay(*walked).states)(large, commands)
+
+
+def is_loaded(robot):
+    """Whether it is a rod of :func:`loaded_rod`, which has several cables."""
+    return robot.model == "rod" and len(robot.cables) > 2
+
+
+def loaded_rod(generator, model):
+    """A rod with several cables, two sections, segments unlike each other, precurvature, gravity and loads."""
+    space, n, ends = 3 if model == "loaded space rod" else 2, 18, (18, 9)
+    turns = [2 * math.pi / 3 * k for k in range(3)] if space == 3 else [0.0, math.pi]
+    cables = [
+        Cable(angle=turn, end=end, offset_mm=offset)
+        for end, offset in zip(ends, (None, 6.0), strict=True)
+        for turn in turns
+    ]
+    force, weight = generator.normal(0, 0.02, space), generator.normal(0, 1e-4, space)
+    common = {
+        "model": "rod",
+        "cables": tuple(cables),
+        "segment_rigidity": tuple(generator.uniform(3000, 7000, n).tolist()),
+        "weight_per_length": tuple(weight.tolist()),
+        "disk_radius_mm": 9.0,
+        "disk_thickness_mm": 1.0,
+        "between": 1,
+    }
+    if space == 2:
+        load = Load(node=n, force=tuple(force.tolist()), moment=float(generator.normal()), at=(8.0, math.pi))
+        return Robot.prototype(precurvature=0.01, loads=(load,), length_range_mm=(120, 180), **common)
+    load = Load(node=n, force=tuple(force.tolist()), at=(8.0, float(generator.uniform(0, 6))))
+    return SpatialRobot.prototype(precurvature=(0.01, -0.005, 0.008), loads=(load,), **common)
+
+
+def loaded_episode(model, index):
+    """A solver of a loaded rod at s = 1 and a walk in it, which pulls one cable after the other."""
+    generator = np.random.default_rng([16, LOADED.index(model), index])
+    robot = loaded_rod(generator, model)
+    kinds = SPATIAL_KINDS if isinstance(robot, SpatialRobot) else PLANAR_KINDS
+    while True:
+        try:
+            solver = make_solver(robot, Scene(kinds[str(generator.choice(("shapes", "springs")))](generator, robot)))
+            break
+        except ValueError:  # an obstacle in the way
+            continue
+    count, goal, rest = len(robot.cables), np.zeros(len(robot.cables)), solver.rest().cables_mm
+    present, commands = np.array([*rest, robot.length_mm]), []
+    for k in range(STEPS):
+        if k % 15 == 0:
+            goal = np.where(np.arange(count) == generator.integers(count), generator.uniform(3, 10), -8.0)
+        change = 0.1 * (goal - present[:-1]) + generator.normal(0, 0.1, count)
+        inserted = generator.uniform(-2, 1) if isinstance(robot, Robot) else 0.0
+        shortest = robot.shortest_mm
+        present = np.array([*(present[:-1] + change), np.clip(present[-1] + inserted, shortest, robot.longest_mm)])
+        commands.append(present)
+    commands = np.array(commands)
+    return solver, Walk(follow(solver, commands), commands)
+
+
+def follow(solver, commands):
+    """States of commands ``(T, cables + 1)`` from rest."""
+    states = [solver.rest()]
+    for command in commands:
+        length = (command[-1],) if isinstance(solver.robot, Robot) else ()
+        states.append(solver.step(states[-1], command[:-1], *length))
+    return states
 
 
 @pytest.fixture(name="episodes")
@@ -35,7 +107,7 @@ def episodes_fixture(pytestconfig):
 
 
 @pytest.mark.parametrize("s", POWERS_OF_TWO)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, *LOADED])
 def test_powers_of_two_give_the_same_bits(model, s, episodes):
     for index in episodes:
         solver, taken = episode(model, index)
@@ -47,7 +119,7 @@ def test_powers_of_two_give_the_same_bits(model, s, episodes):
 
 
 @pytest.mark.parametrize("s", OTHERS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, *LOADED])
 def test_other_scales_give_the_same_robot(model, s, episodes):
     for index in episodes:
         solver, taken = episode(model, index)

@@ -221,10 +221,12 @@ def test_functions(first, second, third):
     survives(free.clearance, ROBOT, SCENE, third)
     survives(sensitivity, first)
     survives(sensitivity, PULLED, second)
-    survives(Sensitivity.obstacle_rows, third)
+    survives(Sensitivity.rows, first)
+    survives(Sensitivity.rows(ROBOT).obstacle, third)
     survives(spatial_sensitivity, first)
     survives(spatial_sensitivity, SPATIAL_PULLED, second)
-    survives(SpatialSensitivity.obstacle_rows, third)
+    survives(SpatialSensitivity.rows, first)
+    survives(SpatialSensitivity.rows(SPATIAL_ROBOT).obstacle, third)
 
 
 def make_batch(spatially):

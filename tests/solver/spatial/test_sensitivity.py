@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from solver import Scene
+from solver import Cable, Load, Scene
 from solver.spatial import (
     Box,
     Capsule,
@@ -30,13 +31,25 @@ PUSHED = [
 ]
 SCENES = [*([o] for o in PUSHED), *([replace(o, spring=SPRING)] for o in PUSHED)]
 COMMAND, STEP = np.array([7.0, 3.0]), 1e-4
+THIRDS = tuple(2 * math.pi / 3 * k for k in range(3))
+LOADED = replace(
+    ROBOT,
+    model="rod",
+    cables=(*(Cable(angle=angle + 0.3) for angle in THIRDS), *(Cable(angle=angle, end=10) for angle in THIRDS)),
+    torsion_ratio=0.7,
+    segment_rigidity=(6000.0,) * 9 + (3000.0,) * 9,
+    precurvature=(0.01, -0.005, 0.008),
+    weight_per_length=(1e-4, 1e-4, -2e-4),
+    loads=(Load(node=18, force=(0.02, -0.01, 0.03), at=(8.0, 1.0)), Load(node=7, force=(0.0, -0.02, 0.0))),
+)
+SEVERAL = np.array([8.0, 1.0, -12.0, 4.0, 1.5, -9.0])  # displacements of the cables of that robot; two are slack
 
 
-def solve(obstacles, command=COMMAND, length=180.0):
-    solver = SpatialSolver(replace(ROBOT, length_mm=length), Scene(obstacles))
+def solve(obstacles, command=COMMAND, length=180.0, robot=ROBOT):
+    solver = SpatialSolver(replace(robot, length_mm=length), Scene(obstacles))
     equilibrium = solver.rest()
     for part in np.linspace(0, 1, 31)[1:]:
-        equilibrium = solver.step(equilibrium, part * np.asarray(command))
+        equilibrium = solver.step(equilibrium, (1 - part) * solver.rest().cables_mm + part * np.asarray(command))
     return equilibrium
 
 
@@ -85,23 +98,45 @@ def compare(slopes, row, ahead, behind):
     assert slopes.turns[row] == pytest.approx(turns, rel=1e-5, abs=1e-8 + 1e-5 * np.abs(turns).max())
 
 
-@pytest.mark.parametrize("obstacles", SCENES, ids=lambda s: s[0].kind + ("" if s[0].spring is None else " on a spring"))
-def test_everything(obstacles):
-    equilibrium = solve(obstacles)
+CASES = [(ROBOT, COMMAND, scene) for scene in SCENES] + [(LOADED, SEVERAL, SCENES[k]) for k in (0, 4, 6)]
+
+
+@pytest.mark.parametrize(
+    ("robot", "command", "obstacles"),
+    CASES,
+    ids=[
+        f"{robot.model}-{scene[0].kind}{'' if scene[0].spring is None else ' on a spring'}" for robot, _, scene in CASES
+    ],
+)
+def test_everything(robot, command, obstacles):
+    solved = partial(solve, robot=robot)
+    equilibrium = solved(obstacles, command)
     assert equilibrium.contact.any()
-    slopes = spatial_sensitivity(equilibrium)
-    for row, change in enumerate(STEP * np.eye(2)):
-        compare(slopes, row, solve(obstacles, COMMAND + change), solve(obstacles, COMMAND - change))
-    compare(slopes, SpatialSensitivity.LENGTH, *(solve(obstacles, length=180 + change) for change in (STEP, -STEP)))
-    first = SpatialSensitivity.obstacle_rows(0).start
+    slopes, rows = spatial_sensitivity(equilibrium), SpatialSensitivity.rows(robot)
+    for row, change in enumerate(STEP * np.eye(len(command))):
+        compare(slopes, row, solved(obstacles, command + change), solved(obstacles, command - change))
+    compare(slopes, rows.length, *(solved(obstacles, command, length=180 + change) for change in (STEP, -STEP)))
     motions = [
         *(lambda by, axis=axis: {"shift": by * axis} for axis in np.eye(3)),
         *(lambda by, axis=axis: {"axis": axis, "turn": by} for axis in range(3)),
         lambda by: {"growth": by},
     ]
     for row, motion in enumerate(motions):
-        ahead, behind = (solve([moved(obstacles[0], **motion(change))]) for change in (STEP, -STEP))
-        compare(slopes, first + row, ahead, behind)
+        ahead, behind = (solved([moved(obstacles[0], **motion(change))], command) for change in (STEP, -STEP))
+        compare(slopes, rows.obstacle(0).start + row, ahead, behind)
+
+
+def test_a_rod_whose_cables_are_slack():
+    """Loads alone press it to the sphere, which it follows; the cables have no slope."""
+    robot = replace(LOADED, loads=(Load(node=18, force=(0.25, 0.1, 0.0)),))
+    sphere, command = Sphere(center=(34, 12, 130), radius=15), np.full(6, -12.0)
+    equilibrium = solve([sphere], command, robot=robot)
+    assert equilibrium.contact.any()
+    assert not equilibrium.tensions.any()
+    slopes = spatial_sensitivity(equilibrium)
+    assert not slopes.nodes[:6].any()
+    ahead, behind = (solve([moved(sphere, shift=(by, 0, 0))], command, robot=robot) for by in (STEP, -STEP))
+    compare(slopes, SpatialSensitivity.rows(robot).obstacle(0).start, ahead, behind)
 
 
 def test_opposite_cables():
