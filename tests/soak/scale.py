@@ -35,9 +35,23 @@ def scale_robot(robot, s):
         "max_cable_mm": s * robot.max_cable_mm,
     }
     if isinstance(robot, Robot):
-        disks = {"disk_radius_mm": s * robot.edge_mm, "disk_thickness_mm": s * robot.disk_thickness_mm}
-        lengths |= disks | {"length_range_mm": times(robot.length_range_mm, s)}
-    return replace(robot, rigidity=s * s * robot.rigidity, **lengths)
+        lengths |= {"length_range_mm": times(robot.length_range_mm, s)}
+    disks = {"disk_radius_mm": s * robot.edge_mm, "disk_thickness_mm": s * robot.disk_thickness_mm}
+    return replace(robot, rigidity=s * s * robot.rigidity, **lengths, **disks, **_of_rod(robot, s))
+
+
+def _of_rod(robot, s):
+    """Return cables and loads of a rod s times as large."""
+    if robot.model == "paper":
+        return {}
+    return {
+        "cables": [replace(cable, offset_mm=cable.offset_mm and s * cable.offset_mm) for cable in robot.cables],
+        "segment_rigidity": times(robot.segment_rigidity, s * s),
+        "weight_per_length": times(robot.weight_per_length, 1 / s),
+        "loads": [
+            replace(load, moment=s * load.moment, at=(s * load.at[0], load.at[1])) for load in robot.loads
+        ],
+    }
 
 
 def scale_scene(scene, s):
