@@ -89,6 +89,7 @@ inline constexpr double kTight = 100.0;      // tension over EI/aL from which su
 inline constexpr double kTightStep = 1e-11;  // the smallest of them [a]
 inline constexpr double kBalance = 1e-5;  // residual of multipliers that balance each other, over the largest of them
 inline constexpr double kPeakStep = 1.25e-3;  // sub-step within which a peak of the tension is ignored [a]
+inline constexpr int kSettling = 3;           // iterations for an equilibrium of cables that pull against each other
 inline constexpr double kYield = 0.0025;      // first displacement by which an overloaded motor yields [a]
 inline constexpr int kStallIterations = 40;
 inline constexpr double kCommandResolution = 1.25e-12;  // smallest difference of commands [a]

@@ -15,7 +15,7 @@ from soak.episodes import Episode, play
 from soak.report import Tally, table
 from soak.scenes import MODELS
 
-SHARES = {"paper": 0.4, "rod": 0.4, "space": 0.2}
+SHARES = {"paper": 2, "rod": 2, "space": 1, "pair": 1, "sections": 1, "gravity": 1, "space rod": 2}
 STEPS = 500  # of an episode
 REPORTS = 20  # written in the course of a run
 KEPT = 10  # cases of each kind that are shrunk and kept

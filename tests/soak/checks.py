@@ -37,10 +37,16 @@ class Finding(NamedTuple):
 
 def check(solver, taken, tally, offset=0):
     """Return all findings of a walk, and add its measurements to the tally."""
-    findings = _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
+    findings = _rest(taken) + _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
     findings += _gave_up(solver, taken, tally) + _blocked(solver, taken, tally) + _cores(solver, taken, tally)
     tally.findings.update(finding.kind for finding in findings)
     return findings
+
+
+def _rest(taken):
+    """Check that the robot came to rest under its loads."""
+    rest = taken.states[0]
+    return [Finding(f"at rest {rest.status.name}", 0, rest.factorizations)] if rest.status > Status.SNAPPED else []
 
 
 def _states(solver, taken, tally):
@@ -51,7 +57,7 @@ def _states(solver, taken, tally):
     least = np.array([state.gaps.min(initial=math.inf) for state in states]) / length
     inside = _least_distance(solver, states) / length
     edges = np.linalg.norm(np.diff(_points(states), axis=2), axis=-1).max(axis=2) / robot.edges_mm
-    tension = np.array([np.max(_tensions(state)) for state in states]) / robot.max_tension
+    tension = np.array([np.max(state.tensions) for state in states]) / robot.max_tension
     work = np.array([state.factorizations for state in states])
     tally.least_gap = min(tally.least_gap, least.min(initial=math.inf))
     tally.least_distance = min(tally.least_distance, inside.min(initial=math.inf))
@@ -65,10 +71,6 @@ def _states(solver, taken, tally):
         *_first("tension", tension > 1 + BAND, tension),
         *_first("factorizations", work > MOST_FACTORIZATIONS, work),
     ]
-
-
-def _tensions(state):
-    return state.tension if isinstance(state.robot, Robot) else state.tensions
 
 
 def _first(kind, wrong, values):
@@ -107,7 +109,8 @@ def _optimality(solver, taken, tally, offset):
             findings.append(Finding("optimality", k, worst))
         event = state.status != Status.CONVERGED and not np.array_equal(before.block, state.block)
         tally.events += event
-        if (event and certified < tally.certificates_each) or (offset + k) % CERTIFY_EVERY == 0:
+        wanted = (event and certified < tally.certificates_each) or (offset + k) % CERTIFY_EVERY == 0
+        if wanted:
             certified += 1
             tally.certified += 1
             worst = certificate(state)
@@ -155,10 +158,10 @@ def _reason(solver, taken, k):
         return reason
     near_zero = PRETENSION * robot.offset_mm
     pulled = command_of(state)[:-1]
-    if isinstance(robot, Robot):
-        if robot.model == "paper" and pulled[0] < near_zero:
+    if robot.model == "paper" and isinstance(robot, Robot):
+        if pulled[0] < near_zero:
             return "slack"
-    elif np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
+    elif robot.model == "paper" and np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"
     state = _repeated(solver, state, command)
     if state.status != Status.GAVE_UP:
@@ -186,7 +189,7 @@ def _distance(state, command):
 def _is_pinched(state, command):
     """Return whether contact forces that the pull of the cables cannot cause squeeze a robot."""
     force = np.linalg.norm(state.forces, axis=-1).max(initial=0)
-    pull, fed = np.max(_tensions(state)), state.length_mm != command[-1]
+    pull, fed = np.max(state.tensions), state.length_mm != command[-1]
     bending = state.robot.rigidity / state.length_mm**2
     return (fed or pull < 0) and force > PINCHED * bending and force > UNPULLED * pull
 
@@ -261,5 +264,5 @@ def accepted(solver, state, command):
 
 def _trace(solver, state, command):
     if isinstance(solver.robot, Robot):
-        return solver.trace(state, float(command[0]), float(command[1]))
-    return solver.trace(state, command[:2])
+        return solver.trace(state, command[:-1], float(command[-1]))
+    return solver.trace(state, command[:-1])

@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field, fields
 
+from soak.scenes import SPATIAL
 from solver import Status
 
 
@@ -48,7 +49,7 @@ class Tally:
             statuses=Counter(Status(state.status).name for state in states),
             kinds=Counter({setting.kind: len(states)}),
             refused=setting.refused,
-            certificates_each=20 if model == "space" else 1000,
+            certificates_each=20 if model in SPATIAL else 1000,
         )
 
     def add(self, other):
@@ -75,7 +76,7 @@ ROWS = {
     "least distance / L": lambda t: f"{t.least_distance:.1e}",
     "largest tension / limit": lambda t: f"{t.most_tension:.9f}",
     "worst optimality": lambda t: f"{t.worst_optimality:.1e}",
-    "worst certificate": lambda t: f"{t.worst_certificate:.1e}",
+    "worst certificate": lambda t: f"{t.worst_certificate:.1e}" if t.certified else "not yet",
     "certified / events": lambda t: f"{t.certified:,} / {t.events:,}",
     "blocked, reached another way": lambda t: f"{t.blocked_unconfirmed} of {t.blocked}",
     "largest work of a step": lambda t: f"{t.most_factorizations:,}",

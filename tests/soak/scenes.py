@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from soak.cores import line_points
+from soak.robots import ROBOTS
 from soak.scale import scale_robot, scale_scene
 from soak.shapes import distance
 from solver import Capsule, Circle, Custom, Ellipse, Family, HalfPlane, Polygon, Robot, Scene, Solver, spatial
-from solver.planar.robot import LINES
-from solver.spatial import SpatialRobot, SpatialSolver
+from solver.spatial import SpatialSolver
 
-MODELS = ("paper", "rod", "space")
+MODELS = tuple(ROBOTS)
+SPATIAL = ("space", "space rod")
 SCALES = (0.1, 1.0, 1.0, 1.0, 10.0)
 TRIES = 200
 OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
@@ -40,10 +41,10 @@ class Setting(NamedTuple):
 
 def sample_setting(generator, model, kinds=None, scales=SCALES):
     """Return a robot in a scene that is clear of it at rest, and whose obstacles all have a core."""
-    sample_robot, samplers = (spatial_robot, SPATIAL_KINDS) if model == "space" else (planar_robot, PLANAR_KINDS)
+    samplers = SPATIAL_KINDS if model in SPATIAL else PLANAR_KINDS
     for refused in range(TRIES):
         kind = str(generator.choice(kinds or list(samplers)))
-        robot = sample_robot(generator) if model == "space" else sample_robot(generator, model)
+        robot = ROBOTS[model](generator)
         scene = Scene(samplers[kind](generator, robot))
         scale = float(generator.choice(scales))
         try:
@@ -56,32 +57,6 @@ def sample_setting(generator, model, kinds=None, scales=SCALES):
 def make_solver(robot, scene):
     """Return the solver of a robot in the plane or in space."""
     return (Solver if isinstance(robot, Robot) else SpatialSolver)(robot, scene)
-
-
-def planar_robot(generator, model):
-    """Return the prototype, or a robot with other segments, lines and points, and a base that inserts it."""
-    robot = replace(Robot.prototype(model="paper", segments=int(generator.choice([9, 18, 18, 18, 30]))), model=model)
-    if generator.random() < 0.5:
-        robot = replace(robot, between=int(generator.integers(4)))
-    if generator.random() < 0.3:
-        robot = replace(robot, touch=LINES)
-    if generator.random() < 0.3:
-        robot = replace(robot, length_range_mm=(100.0, 180.0), length_mm=float(generator.uniform(100, 180)))
-    return robot
-
-
-def spatial_robot(generator):
-    """Return the prototype, or a robot with fewer segments, other lines, points and angles."""
-    robot = SpatialRobot.prototype(
-        segments=int(generator.choice([9, 18, 18, 18])),
-        angle=float(generator.choice([math.pi / 2, 2 * math.pi / 3])),
-        model="paper",
-    )
-    if generator.random() < 0.3:
-        robot = replace(robot, between=1)
-    if generator.random() < 0.2:
-        robot = replace(robot, touch=("backbone", "rim"), rim_points=8)
-    return robot
 
 
 def _clear(generator, robot, sample, count, margin=None):
@@ -98,7 +73,14 @@ def _clear(generator, robot, sample, count, margin=None):
 
 
 def rest_points(robot):
-    """Return the points of the straight robot, ``(p * positions, d)``."""
+    """Return the points of the robot without loads, ``(p * positions, d)``."""
+    if np.any(robot.precurvature):
+        points = (
+            make_solver(replace(robot, loads=(), weight_per_length=len(robot.weight_per_length) * (0.0,)), Scene())
+            .rest()
+            .points
+        )
+        return points.reshape(-1, points.shape[-1])
     along = np.linspace(0, robot.length_mm, robot.segments + 1)
     nodes, frames = np.zeros((1, len(along), 3)), np.broadcast_to(np.eye(3), (1, len(along), 3, 3))
     nodes[0, :, 1 if isinstance(robot, Robot) else 2] = along

@@ -4,7 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from soak.drives import drives_of
 from solver import Robot
+
+SIGNED = 0.8  # share of the moves of several cables that are signed commands
 
 
 class Walk(NamedTuple):
@@ -15,12 +18,17 @@ class Walk(NamedTuple):
 
 
 def walk(solver, increments):
-    """Walk by increments ``(T, cables + 1)`` on what the robot has reached, clipped to its range."""
+    """Walk by increments on what the robot has reached, clipped to its range.
+
+    Each is a pair of a drive and a move of its inputs, the length last.
+    """
     states, commands = [solver.rest()], []
-    for increment in increments:
-        commands.append(_in_range(solver.robot, command_of(states[-1]) + increment))
+    for drive, increment in increments:
+        reached = command_of(states[-1])
+        command = np.append(drive.pulls(reached[:-1], increment[:-1]), reached[-1] + increment[-1])
+        commands.append(_in_range(solver.robot, command))
         states.append(step(solver, states[-1], commands[-1]))
-    return Walk(states, np.array(commands).reshape(-1, increments.shape[1]))
+    return Walk(states, np.reshape(commands, (-1, len(solver.robot.cables) + 1)))
 
 
 def replay(solver, commands):
@@ -34,31 +42,31 @@ def replay(solver, commands):
 def step(solver, state, command):
     """Return the equilibrium after one step to a command (cables, length)."""
     if isinstance(solver.robot, Robot):
-        return solver.step(state, float(command[0]), float(command[1]))
-    return solver.step(state, command[:2])
+        return solver.step(state, command[:-1], float(command[-1]))
+    return solver.step(state, command[:-1])
 
 
 def command_of(state):
     """Return the present cable displacements and length of a state, ``(cables + 1,)`` [mm]."""
-    cables = [state.cable_mm] if isinstance(state.robot, Robot) else state.cables_mm
-    return np.array([*cables, state.length_mm])
+    return np.array([*state.cables_mm, state.length_mm])
 
 
 def _in_range(robot, command):
-    high = robot.cable_limit_mm
-    low, lengths = (0.0, robot.lengths_mm) if isinstance(robot, Robot) else (-high, 2 * (robot.length_mm,))
-    return np.array([*np.clip(command[:-1], low, high), np.clip(command[-1], *lengths)])
+    cables = np.clip(command[:-1], robot.least_cable_mm, robot.cable_limit_mm)
+    return np.array([*cables, np.clip(command[-1], robot.shortest_mm, robot.longest_mm)])
 
 
 def sample_increments(generator, solver, scale, steps):
-    """Return increments of cables and length, in several ways of moving in turn, ``(steps, cables + 1)`` [mm]."""
+    """Return moves in several ways in turn, a list of (drive, increments of its inputs and of the length [mm])."""
     rows, calm = [], generator.random() < 0.6
+    drives = drives_of(generator, solver.robot)
     while len(rows) < steps:
         count, sizes = int(generator.integers(3, 31)), _sizes(generator, calm)
-        direction = _direction(generator, solver)
+        drive = drives[0] if len(drives) == 1 or generator.random() < SIGNED else drives[1]
+        direction = _direction(generator, solver, drive)
         insertion = _insertion(generator) if getattr(solver.robot, "length_range_mm", None) else lambda: 0.0
-        rows += [[*(sizes() * direction), insertion()] for _ in range(count)]
-    return scale * np.array(rows[:steps])
+        rows += [(drive, scale * np.array([*(sizes() * direction), insertion()])) for _ in range(count)]
+    return rows[:steps]
 
 
 def _sizes(generator, calm):
@@ -77,14 +85,20 @@ def _sizes(generator, calm):
     return ways[generator.choice(len(ways), p=weights / weights.sum())]
 
 
-def _direction(generator, solver):
-    """Return the direction of the cables, in space mostly towards an obstacle."""
-    if isinstance(solver.robot, Robot):
+def _direction(generator, solver, drive):
+    """Return the direction of the inputs, in space that of the first two mostly towards an obstacle."""
+    planar = isinstance(solver.robot, Robot)
+    if planar and drive.inputs == 1 and solver.robot.least_cable_mm == 0:
         return np.ones(1)
-    if generator.random() < 0.3 or not len(solver.scene):
-        towards = generator.normal(size=2)
+    if planar or (drive.matrix is None and solver.robot.model == "rod"):
+        towards = generator.normal(size=drive.inputs)
+        if generator.random() < 0.3:
+            towards = np.abs(towards)
+    elif generator.random() < 0.3 or not len(solver.scene):
+        towards = generator.normal(size=drive.inputs)
     else:
         towards = np.array(solver.scene.obstacles[generator.integers(len(solver.scene))].extent.center[:2])
+        towards = np.append(towards, np.linalg.norm(towards) * generator.normal(size=drive.inputs - 2))
     return towards / np.linalg.norm(towards)
 
 

@@ -85,7 +85,8 @@ class Planar {
   double bend(int segment) const requires(kRod) { return bends_[segment].angle; }
   int disk_side(int segment) const requires(kRod) { return bends_[segment].angle < 0; }
   DiskGap disk_gap(int segment, int side) const requires(kRod);
-  // Slope of that gap as moments on the lower and upper disk, and its curvature in the control.
+  // Slope of that gap in the control and as moments on the lower and upper disk, and its curvature in the control.
+  Control disk_slope(int, const DiskGap& gap) const requires(kRod) { return {{gap.slope}}; }
   Vec<1> disk_moment(int segment, const DiskGap& gap) const requires(kRod) { return {{-gap.slope}}; }
   Mat<1, 1> disk_curvature(int segment, const DiskGap& gap) const requires(kRod) { return {{gap.curvature}}; }
   // Sine of the shear angle at which a segment folds over.

@@ -99,11 +99,15 @@ DiskGap SpatialRod::disk_gap(int segment, int) const {
   return measure_disk_gap(bend(segment), length_, robot_.disk_radius, robot_.disk_thickness);
 }
 
+SpatialRod::Control SpatialRod::disk_slope(int segment, const DiskGap& gap) const {
+  const double across = gap.slope / bend(segment);
+  return {{across * controls_.at(0, segment), across * controls_.at(1, segment), 0}};
+}
+
 // The gap depends on the rotation between both disks, so a moment on one is opposed by that on the other. The slope in
 // the control is turn_slopeᵀ times the moment, in the lower disk's frame.
 Vec<3> SpatialRod::disk_moment(int segment, const DiskGap& gap) const {
-  const double bent = bend(segment);
-  Vec<3> slope{{gap.slope * controls_.at(0, segment) / bent, gap.slope * controls_.at(1, segment) / bent, 0}};
+  const Vec<3> slope = disk_slope(segment, gap);
   const Mat<3, 3>& t = bends_[segment].turn_slope;
   const auto column = [&](int c) { return Vec<3>{{t(0, c), t(1, c), t(2, c)}}; };
   const Vec<3> yz = cross(column(1), column(2)), zx = cross(column(2), column(0)), xy = cross(column(0), column(1));

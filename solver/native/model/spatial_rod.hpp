@@ -55,7 +55,8 @@ class SpatialRod {
   double bend(int segment) const { return std::hypot(controls_.at(0, segment), controls_.at(1, segment)); }
   int disk_side(int) const { return 0; }
   DiskGap disk_gap(int segment, int side) const;
-  // Slope of that gap as moments on the lower and upper disk, and its curvature in the control.
+  // Slope of that gap in the control and as moments on the lower and upper disk, and its curvature in the control.
+  Control disk_slope(int segment, const DiskGap& gap) const;
   Vec<3> disk_moment(int segment, const DiskGap& gap) const;
   Mat<3, 3> disk_curvature(int segment, const DiskGap& gap) const;
 

@@ -52,7 +52,10 @@ ActiveSetQp<Model>::Gram ActiveSetQp<Model>::factor_gram(const ActiveSet& active
       const double entry = along(i, responses_[j]);
       double sum = entry;
       for (int k = 0; k < j; ++k) sum -= gram_[i][k] * gram_[j][k] * gram_[k][k];
-      if (i == j && !(std::abs(sum) > kDependent * std::abs(entry))) return Gram::kDependent;
+      if (i == j && !(std::abs(sum) > kDependent * std::abs(entry))) {
+        dependent_ = j;
+        return Gram::kDependent;
+      }
       negative += i == j && sum < 0;
       gram_[i][j] = i == j ? sum : sum / gram_[j][j];
     }
@@ -156,7 +159,14 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
     const double shortfall = -problem.gaps()[contact] - along(count, step);
     const double to_close = curvature > kDependent * std::abs(full) ? shortfall / curvature : kNever;
     const double length = std::min(to_release, to_close);
-    if (!(length < kNever)) return false;
+    if (!(length < kNever)) {
+      conflict_ = active;
+      for (int j = 0; j < count; ++j) conflict_.multiplier[j] = std::max(0.0, -trade[j]);
+      conflict_.contact[count] = contact;
+      conflict_.multiplier[count] = 1;
+      ++conflict_.count;
+      return false;
+    }
 
     step.add(length, response);
     for (int j = 0; j < count; ++j) {
@@ -209,6 +219,7 @@ int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const Activ
 template <class Model>
 bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active,
                                       Direction& step) {
+  conflict_.count = 0;
   if (!drop_negative_multipliers(problem, active, step)) return false;
   for (int change = 0; change < kActiveSetChanges; ++change) {
     const int contact = most_violated(problem, active, step);
@@ -265,6 +276,15 @@ bool ActiveSetQp<Model>::find_softest(const ContactProblem& problem, KktSystem& 
   return true;
 }
 
+namespace {
+
+bool is_pushing(const ActiveSet& active) {
+  const auto end = active.multiplier.begin() + active.count;
+  return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
+}
+
+}  // namespace
+
 template <class Model>
 bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
   const Load load{nullptr, &step};
@@ -272,8 +292,24 @@ bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, 
   add_penalty_response(problem, active, step);
   if (factor_gram(active) != Gram::kSound) return false;
   apply(closing_multipliers(problem, active, step), active, step);
-  const auto end = active.multiplier.begin() + active.count;
-  return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
+  return is_pushing(active);
+}
+
+template <class Model>
+bool ActiveSetQp<Model>::balance(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
+  int count = 0;
+  negative_ = kkt.negative;
+  for (; count < active.count; ++count) loads_[count] = linearize_gap(problem, active.contact[count], count, 0);
+  loads_[count++] = {nullptr, &step};
+  kkt.solve(problem, std::span(loads_).first(count));
+  Gram gram = factor_gram(active);
+  for (; gram == Gram::kDependent; gram = factor_gram(active)) remove_contact(active, dependent_, active.count);
+  if (gram == Gram::kUnstable) return false;
+  Multipliers change;
+  for (int j = 0; j < active.count; ++j) change[j] = -along(j, step);
+  solve_gram(active.count, change);
+  apply(change, active, step);
+  return is_pushing(active);
 }
 
 #define CCR_INSTANTIATE(Model) template class ActiveSetQp<Model>;

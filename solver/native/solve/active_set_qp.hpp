@@ -37,6 +37,15 @@ class ActiveSetQp {
   bool find_softest(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active, Direction& seed,
                     Direction& softest);
 
+  // Finds the step and the multipliers that balance the gradient while the active gaps stay as they are. Leaves out of
+  // `active` the gaps whose slopes depend on those before; they keep the multipliers that the gradient contains. False
+  // where H is not positive definite on the tangent space, or a multiplier would be negative.
+  bool balance(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
+
+  // Where the last solve or restoration found that the linearised gaps have no common solution: those gaps, the last
+  // one that which could not be added, with multipliers ν >= 0 that balance each other, Σ ν ∇c = 0. Empty otherwise.
+  const ActiveSet& conflict() const { return conflict_; }
+
   // Finds a further step near the last solve, on its active set and with its factorisation. False where a multiplier
   // would be negative.
   bool correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
@@ -65,7 +74,9 @@ class ActiveSetQp {
   std::vector<Direction> responses_;  // H⁻¹∇c
   std::vector<Load> loads_;
   std::array<Multipliers, tolerances::kMaxActive> gram_;  // ∇cᵀH⁻¹∇c as L D Lᵀ: unit L below the diagonal, D on it
-  int negative_ = 0;                                      // eigenvalues of H
+  int dependent_ = 0;                                     // the first such gap of the last dependent set
+  ActiveSet conflict_;
+  int negative_ = 0;  // eigenvalues of H
 };
 
 }  // namespace ccr

@@ -201,8 +201,8 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
   for (std::size_t m = 0; m < springs_.size(); ++m) mount_gradient_[m] = times(springs_[m], displacements_[m]);
   for (int j = 0; j < active.count; ++j) {
     if constexpr (Model::kRod)
-      if (is_slack(active.contact[j])) {
-        slack_multipliers[active.contact[j] - contacts()] = active.multiplier[j];
+      if (active.contact[j] >= contacts()) {
+        if (is_slack(active.contact[j])) slack_multipliers[active.contact[j] - contacts()] = active.multiplier[j];
         continue;
       }
     const auto& [force, mount, normal, minus_controls] = slope(active.contact[j]);
@@ -214,9 +214,24 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
     }
   }
   model_.propagate_adjoints(node_forces_);
-  if constexpr (Model::kRod) model_.add_slacks(slack_multipliers);
+  if constexpr (Model::kRod) {
+    model_.add_slacks(slack_multipliers);
+    push_disks(active);
+  }
   if (in_barrier())
     for (std::size_t i = 0; i < barrier_slope_.size(); ++i) model_.gradient[i] += barrier_slope_[i];
+}
+
+// Adds the contacts of disks to the gradient. They are functions of their segment's control, so they stay out of the
+// adjoints, whose part of the Hessian would be that of moments which turn with the disks.
+template <class Model>
+void ContactProblem<Model>::push_disks(const ActiveSet& active) requires(Model::kRod) {
+  for (int j = 0; j < active.count; ++j) {
+    if (active.contact[j] < first_disk_contact()) continue;
+    const int segment = disk_segment(active.contact[j]);
+    const Control slope = model_.disk_slope(segment, disk_gap(active.contact[j]));
+    for (int k = 0; k < Model::kControl; ++k) model_.gradient[segment][k] -= active.multiplier[j] * slope[k];
+  }
 }
 
 template <class Model>

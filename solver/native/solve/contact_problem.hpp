@@ -179,6 +179,7 @@ class ContactProblem {
   void update_springs(const std::vector<Position>& mounts);
   void measure_gaps();
   void measure_slacks_and_disks(const Command& command) requires(Model::kRod);
+  void push_disks(const ActiveSet& active) requires(Model::kRod);
   int disk_segment(int contact) const { return (contact - first_disk_contact()) / Model::kDiskSides; }
   DiskGap disk_gap(int contact) const requires(Model::kRod) {
     return model_.disk_gap(disk_segment(contact), (contact - first_disk_contact()) % Model::kDiskSides);

@@ -12,7 +12,10 @@ using namespace tolerances;
 
 template <class Model>
 struct ModelContinuation<Model>::Pursuit {
-  Command wanted;  // the command, less what stalled cables do not meet
+  Command target;            // the command
+  Command wanted = target;   // the command, less what stalled cables do not meet
+  Command resumed = target;  // where stalled cables were last pulled again
+  bool was_resumed = false;  // whether they were
   double step = kLargestStep;
   double yielding = kYield;  // least displacement of the next yield [a]
   bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
@@ -194,7 +197,7 @@ ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(
 
 template <class Model>
 Status ModelContinuation<Model>::pursue(const Command& target) {
-  Pursuit pursuit{.wanted = target};
+  Pursuit pursuit{.target = target};
   newton_.begin_step();
   const double limit = problem_.robot().max_tension;
   for (int sub = 0; sub < kSubSteps && !work_is_spent(); ++sub) {
@@ -212,10 +215,23 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
     }
     const Command goal = raise_to_pretension(pursuit.wanted);
     const double remaining = command_distance(present_.command, goal);
+    if (remaining == 0 && resume(pursuit)) continue;
     if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;
   }
   result_.reason = Reason::kWork;
   return Status::kGaveUp;
+}
+
+// Pulls stalled cables again, as others that moved on may have let them; false where that has just been tried.
+template <class Model>
+bool ModelContinuation<Model>::resume(Pursuit& pursuit) const {
+  const Command& here = present_.command;
+  if (pursuit.wanted == pursuit.target || pursuit.reached != Status::kStalled) return false;
+  if (pursuit.was_resumed && command_distance(here, pursuit.resumed) <= kSmallestStep) return false;
+  pursuit.wanted = pursuit.target;
+  pursuit.resumed = here;
+  pursuit.was_resumed = true;
+  return true;
 }
 
 // One sub-step towards a command at a distance; false at the end of the pursuit.
@@ -237,6 +253,12 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   } else if (size > kSmallestStep || (size > kTightStep && is_tight() && !is_blocked(next))) {
     step = size / 2;
     pursuit.refined = true;
+  } else if (const Conflict conflict = meet_conflict(next); conflict != Conflict::kNone) {
+    stalled = conflict == Conflict::kTight;
+    if (!stalled) {
+      pursuit.reached = Status::kBlocked;
+      return false;
+    }
   } else {
     const End end = descend_from_end(next);
     if (end == End::kStuck) {

@@ -1,6 +1,7 @@
 // The continuation compiled for one model. Its files: block_io (blocks read and written), model_continuation (a branch
 // followed), rest (where it begins), acceptance (whether a shape continues the branch), passage (whether the robot
-// passed through an obstacle), tension_limit (stalls and yielding motors), descent (what happens after the end of a
+// passed through an obstacle), tension_limit (stalls and yielding motors), conflict (cables that pull against each
+// other), descent (what happens after the end of a
 // branch), ramp (whether a pull reaches a force).
 #pragma once
 
@@ -51,6 +52,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension };
+  enum class Conflict { kNone, kTight, kBlocked };
   enum class End { kPassed, kSnapped, kStuck, kOverTension };
 
   // How a command is pursued: the sub-step to try next, and what has happened so far.
@@ -68,6 +70,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
   // Following a branch.
   Status pursue(const Command& target);
+  bool resume(Pursuit& pursuit) const;
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
   Command raise_to_pretension(Command wanted) const;
   Move try_command(const Command& command);
@@ -125,6 +128,12 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool is_blocked(const Command& command);
   bool find_holding_set(const Command& command, ActiveSet& holding);
   void keep_last_held(const Iterate& held);
+
+  // Gaps that no motion satisfies together.
+  Conflict meet_conflict(const Command& command);
+  bool can_tighten(const ActiveSet& conflict) const;
+  bool close_gap(const Command& command, int contact);
+  bool raise_tensions(const ActiveSet& conflict);
 
   // The descent after the end of a branch.
   End descend_from_end(const Command& command);

@@ -217,6 +217,23 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
 }
 
 template <class Model>
+bool Newton<Model>::settle(Iterate& at) {
+  choose_test();
+  for (int iteration = 0; problem.evaluate(at); ++iteration) {
+    problem.reduced_gradient(at.active);
+    if (!factor_penalized(at.active, kPenalties)) return false;
+    ActiveSet others = at.active;
+    const bool stable = qp_.balance(problem, kkt_, others, step_);
+    if (!stable || iteration == kSettling || is_equilibrium(at.active)) return stable && is_equilibrium(at.active);
+    advance(at, 1, step_, at);
+    for (int j = 0; j < others.count; ++j)
+      for (int k = 0; k < at.active.count; ++k)
+        if (at.active.contact[k] == others.contact[j]) at.active.multiplier[k] = others.multiplier[j];
+  }
+  return false;
+}
+
+template <class Model>
 bool Newton<Model>::set_metric(const Iterate& at) {
   needed_damping_ = 0;
   stretch_ = kStretch;

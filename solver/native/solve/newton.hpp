@@ -36,6 +36,12 @@ class Newton {
   // positive definite on the tangent space of the active gaps, but for the first `damped` iterations, which are damped.
   NewtonResult solve(Iterate& at, int damped);
 
+  // Moves a shape close to a stable equilibrium to it, where slopes of active gaps depend on those before: the
+  // multipliers of these gaps are kept. False where there is none.
+  bool settle(Iterate& at);
+  // Of the last iteration: gaps that no step satisfies together; see ActiveSetQp.
+  const ActiveSet& conflict() const { return qp_.conflict(); }
+
   // Begins to count the work of a step.
   void begin_step() { factorizations_before_ = factorizations(); }
 
