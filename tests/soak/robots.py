@@ -90,8 +90,9 @@ def _ending(cable, end):
 def _opposing(generator, end=None):
     """Return two cables on opposite sides, half of them at the same distance from the backbone."""
     offsets = (None, None) if generator.random() < 0.5 else generator.uniform(2, 8, 2).tolist()
-    return tuple(
-        Cable(angle=angle, offset_mm=offset, end=end) for angle, offset in zip((0, math.pi), offsets, strict=False)
+    sides = zip((0, math.pi), offsets, strict=True)
+    return tuple(Cable(angle=angle, offset_mm=offset, end=end) for angle, offset in sides)
+        Cable(angle=angle, offset_mm=offset, end=end) for angle, offset in zip((0, math.pi), offsets, strict=True)
     )
 
 
@@ -106,7 +107,7 @@ def _around(generator):
         case _:
             angles = generator.uniform(0, 2 * math.pi, count)
     offsets = count * [None] if generator.random() < 0.6 else generator.uniform(2, 8, count).tolist()
-    return tuple(Cable(angle=angle, offset_mm=offset) for angle, offset in zip(angles.tolist(), offsets, strict=False))
+    return tuple(Cable(angle=angle, offset_mm=offset) for angle, offset in zip(angles.tolist(), offsets, strict=True))
 
 
 def _limit(generator):
