@@ -38,6 +38,7 @@ MIXES: dict[str, Callable[[], Steps]] = {
     "paper": lambda: planar("paper"),
     "rod": lambda: planar("rod"),
     "space": lambda: list(space.contact_mix(STEPS)),
+    "space rod": lambda: list(space.contact_mix(STEPS, robot=space.rod(4))),
 }
 
 
@@ -45,10 +46,10 @@ def write(steps: Steps, path: Path) -> None:
     """Write the recording that replay.cpp reads, counts included, as one array of numbers."""
     robot = steps[0].solver.robot
     in_space = not isinstance(robot, Robot)
-    sliding = not in_space and robot.model == "rod"
+    angles = [cable.angle for cable in robot.cables] if robot.model == "rod" else []
     numbers = [robot.length_mm, robot.offset_mm, robot.rigidity, robot.max_tension]
     groups = [(solver, list(group)) for solver, group in groupby(steps, key=lambda step: step.solver)]
-    parts: list[object] = [3 if in_space else 2, sliding, robot.segments, *numbers, len(groups)]
+    parts: list[object] = [3 if in_space else 2, len(angles), angles, robot.segments, *numbers, len(groups)]
     for solver, group in groups:
         parts.append(len(solver.scene))
         for obstacle in solver.scene:

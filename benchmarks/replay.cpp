@@ -32,7 +32,8 @@ class Recording {
 template <int D>
 int replay(Recording& recording) {
   ccr::testing::RobotNumbers numbers;
-  numbers.rod = recording.count() != 0;
+  numbers.cables = recording.numbers(recording.count());
+  numbers.rod = !numbers.cables.empty();
   numbers.segments = recording.count();
   numbers.length = recording.number();
   numbers.offset = recording.number();
@@ -51,7 +52,7 @@ int replay(Recording& recording) {
     continuation->set_obstacles(obstacles);
     std::vector<double> to(continuation->layout().size);
     for (int left = recording.count(); left > 0; --left, ++steps) {
-      const std::vector<double> command = recording.numbers(D), from = recording.numbers(to.size());
+      const std::vector<double> command = recording.numbers(continuation->layout().cables.size + 1), from = recording.numbers(to.size());
       continuation->follow(from.data(), command.data(), to.data());
     }
   }

@@ -55,15 +55,17 @@ def checked(default: T, check: Callable[..., object], /, **bounds: object) -> T:
     return field(default=default, metadata={"check": partial(check, **bounds)})
 
 
-def nested(kind: type[DataclassT], default: Callable[[], DataclassT] | None = None) -> DataclassT:
+def nested(kind: type[DataclassT], default: Callable[[], DataclassT] | None = None, **usual: object) -> DataclassT:
     """Declare a dataclass field that holds a dataclass; a mapping of its fields, or None for the default, is accepted.
 
     Args:
         kind: The dataclass.
         default: Makes the default; ``None`` to call ``kind()``.
+        **usual: Fields that a mapping need not name.
     """
     make = default or kind
-    return field(default_factory=make, metadata={"check": partial(check_instance, kind=kind, default=make)})
+    check = partial(check_instance, kind=kind, default=make, usual=usual)
+    return field(default_factory=make, metadata={"check": check})
 
 
 def check_fields(instance: "DataclassInstance") -> None:
@@ -208,9 +210,21 @@ def check_type(name: str, value: object, kind: type | UnionType, wanted: str = "
 
 
 def check_instance(
-    name: str, value: object, *, kind: type[DataclassT], default: Callable[[], DataclassT] | None = None
+    name: str,
+    value: object,
+    *,
+    kind: type[DataclassT],
+    default: Callable[[], DataclassT] | None = None,
+    usual: Mapping[str, object] | None = None,
 ) -> DataclassT:
     """Return a dataclass, given as one or as a mapping of its fields; None and ``{}`` stand for the default.
+
+    Args:
+        name: Name of the field.
+        value: The dataclass or the mapping.
+        kind: The class.
+        default: Makes the default; ``None`` for none.
+        usual: Fields that a mapping need not name.
 
     Raises:
         TypeError: If it is anything else, or the mapping has an unknown field.
@@ -220,7 +234,7 @@ def check_instance(
         return default()
     if isinstance(value, Mapping):
         check_names(name, value, [declared.name for declared in fields(kind) if declared.init])
-        return kind(**value)
+        return kind(**{**(usual or {}), **value})
     check_type(name, value, kind, f"a {kind.__name__} or a mapping of its fields")
     assert isinstance(value, kind)
     return value

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Generic, Literal, TypeVar
 
 from ccr_gym.checks import (
@@ -45,7 +46,7 @@ class BaseSettings(Generic[RobotT]):
     """Settings that all environments share.
 
     Attributes:
-        robot: The robot, or a mapping of its fields; by default the paper's prototype.
+        robot: The robot, or a mapping of its fields; by default the paper's prototype, in its model.
         obs_mode: Form of the observation: ``"dict"`` or ``"flat"``.
         force_sensor: Whether the measured contact force is observed beside the virtual-work estimate.
         max_increment_mm: Cable displacement of a full action [mm].
@@ -99,7 +100,18 @@ class BaseSettings(Generic[RobotT]):
 class Settings(BaseSettings[Robot]):
     """Settings in the plane; see :class:`BaseSettings`."""
 
-    robot: Robot = nested(Robot, Robot.prototype)
+    robot: Robot = nested(Robot, partial(Robot.prototype, model="paper"), model="paper")
+
+    def __post_init__(self) -> None:
+        BaseSettings.__post_init__(self)
+        _require_one_cable(self.robot)
+
+
+def _require_one_cable(robot: Robot) -> None:
+    require(
+        robot.bends_evenly,
+        "robot has several cables, loads, precurvature or unequal segments; environments take one cable to the tip",
+    )
 
 
 def _insertable() -> Robot:
@@ -115,11 +127,12 @@ class InsertionSettings(BaseSettings[Robot]):
         max_insertion_mm: Insertion of a full action [mm].
     """
 
-    robot: Robot = nested(Robot, _insertable)
+    robot: Robot = nested(Robot, _insertable, model="paper")
     max_insertion_mm: float = checked(1.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
         BaseSettings.__post_init__(self)
+        _require_one_cable(self.robot)
         require(self.robot.length_range_mm is not None, "robot has no length_range_mm; give the lengths of insertion")
         require(self.backend == "native", f"backend is {self.backend!r}; with insertion it must be 'native'")
 
@@ -135,12 +148,13 @@ class SpatialSettings(BaseSettings[SpatialRobot]):
         backend: ``"native"``; the reference solver does not give all that is observed in space.
     """
 
-    robot: SpatialRobot = nested(SpatialRobot, SpatialRobot.prototype)
+    robot: SpatialRobot = nested(SpatialRobot, partial(SpatialRobot.prototype, model="paper"), model="paper")
     cable_limit_mm: float = checked(10.0, check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
         BaseSettings.__post_init__(self)
         require(self.backend == "native", f"backend is {self.backend!r}; in space it must be 'native'")
+        require(self.robot.model == "paper", "robot is a rod; in space environments take robots of the paper's model")
 
 
 AnySettings = Settings | InsertionSettings | SpatialSettings

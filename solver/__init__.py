@@ -3,10 +3,12 @@
 from solver.cache.memo import TransitionMemo
 from solver.common.equilibrium import Optimality, Residuals
 from solver.common.obstacle import Extent, Obstacle
+from solver.common.presets import PRESETS, Preset
 from solver.common.rod import Cable, Load
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.common.trace import Trace
+from solver.common.transmission import Transmission
 from solver.planar.batch import BatchSolver, ReferenceBatch
 from solver.planar.custom import Custom
 from solver.planar.equilibrium import Equilibrium
@@ -30,6 +32,7 @@ from solver.planar.sensitivity import Sensitivity, sensitivity
 from solver.planar.solve import Solver
 
 __all__ = [
+    "PRESETS",
     "BatchSolver",
     "Cable",
     "Capsule",
@@ -45,6 +48,7 @@ __all__ = [
     "Obstacle",
     "Optimality",
     "Polygon",
+    "Preset",
     "ReferenceBatch",
     "ReferenceSolver",
     "Residuals",
@@ -56,6 +60,7 @@ __all__ = [
     "Status",
     "Trace",
     "TransitionMemo",
+    "Transmission",
     "VirtualWork",
     "clearance",
     "contact_estimate",

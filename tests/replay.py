@@ -23,12 +23,12 @@ from solver.spatial import Box, Cylinder, SpatialRobot, SpatialSolver, Sphere
 
 RECORDED = Path(__file__).parent / "data" / "replay.json"
 SOLVER_STEPS, SINGLE_STEPS, VECTOR_STEPS, ENVS = 2500, 350, 90, 4
-INSERTED = replace(Robot.prototype(), length_range_mm=(160.0, 200.0), between=1)
+INSERTED = replace(Robot.prototype(model="paper"), length_range_mm=(160.0, 200.0), between=1)
 ROBOTS = {
-    "paper": replace(Robot.prototype(), model="paper"),
-    "rod": replace(Robot.prototype(), model="rod"),
+    "paper": replace(Robot.prototype(model="paper"), model="paper"),
+    "rod": replace(Robot.prototype(model="paper"), model="rod"),
     "insertion": INSERTED,
-    "space": SpatialRobot.prototype(),
+    "space": SpatialRobot.prototype(model="paper"),
 }
 STATE = ("nodes", "multipliers", "gaps", "forces", "displacements", "objective", "status", "factorizations")
 FEATURES = ("avx", "avx2", "avx512f", "fma")

@@ -1,4 +1,4 @@
-"""Every block of the README runs as printed: Python in a fresh process, commands as far as they can be told apart."""
+"""Every block of README and docs runs as printed: Python in a fresh process, commands as far as one can tell."""
 
 import re
 import shlex
@@ -11,7 +11,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
-BLOCKS = re.findall(r"^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+PAGES = [README, *(page.read_text() for page in sorted((ROOT / "docs").glob("*.md")))]
+BLOCKS = [block for page in PAGES for block in re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)]
 COMMANDS = [
     command
     for block in re.findall(r"^```console\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
@@ -40,6 +41,14 @@ def test_command_is_there(command):
         parse(arguments)
     else:
         assert program == "tensorboard"
+
+
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))], ids=lambda page: page.name
+)
+def test_links_lead_to_files(page):
+    for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
+        assert (page.parent / target).exists(), target
 
 
 def test_there_are_blocks_and_commands():

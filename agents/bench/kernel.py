@@ -97,7 +97,7 @@ def contact_mix(steps: int, seed: int = 0, robot: Robot = Robot.prototype()) -> 
 
 def call_overhead() -> float:
     """Return the median duration of a call that does next to nothing: a free robot of two segments that stays [µs]."""
-    solver = Solver(Robot.prototype(segments=2), Scene())
+    solver = Solver(Robot.prototype(model="paper", segments=2), Scene())
     return float(np.median([timed_step(solver, solver.rest(), 0.0).microseconds for _ in range(10_000)]))
 
 
@@ -121,7 +121,7 @@ PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25
 
 def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
     """Return the mean over a path of each step's median duration, by number of segments [µs]."""
-    solvers = {n: Solver(Robot.prototype(segments=n), Scene([PUSHED])) for n in counts}
+    solvers = {n: Solver(Robot.prototype(model="paper", segments=n), Scene([PUSHED])) for n in counts}
     return {
         n: float(np.median([path_times(solver) for _ in range(repeats)], axis=0).mean())
         for n, solver in solvers.items()
@@ -133,8 +133,8 @@ FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=6) for k in range(31)]
 
 def cost(obstacles: list[Circle], model: Literal["paper", "rod"] = "paper", repeats: int = 40) -> float:
     """Return the duration of a path relative to that of the paper's model with one obstacle; medians of paired runs."""
-    reference = Solver(Robot.prototype(), Scene([PUSHED]))
-    other = Solver(replace(Robot.prototype(), model=model), Scene(obstacles))
+    reference = Solver(Robot.prototype(model="paper"), Scene([PUSHED]))
+    other = Solver(replace(Robot.prototype(model="paper"), model=model), Scene(obstacles))
     times = np.array([(path_times(reference), path_times(other)) for _ in range(repeats)])
     mean_reference, mean_other = np.median(times, axis=0).mean(axis=1)
     return float(mean_other / mean_reference)
@@ -142,7 +142,7 @@ def cost(obstacles: list[Circle], model: Literal["paper", "rod"] = "paper", repe
 
 def cold_ratio(repeats: int = 40) -> float:
     """Return the duration from rest to 8 mm, in steps of 0.25 mm, relative to that of the last step alone."""
-    solver = Solver(Robot.prototype(), Scene([PUSHED]))
+    solver = Solver(Robot.prototype(model="paper"), Scene([PUSHED]))
     upwards = len(PATH) // 2
     times = np.median([path_times(solver)[:upwards] for _ in range(repeats)], axis=0)
     return float(times.sum() / times[-1])
@@ -150,7 +150,7 @@ def cold_ratio(repeats: int = 40) -> float:
 
 def memo_ratio(repeats: int = 21) -> float:
     """Return the duration of a warm step relative to that of its replay from the memo; medians of paired runs."""
-    solver = Solver(Robot.prototype(), Scene([PUSHED]))
+    solver = Solver(Robot.prototype(model="paper"), Scene([PUSHED]))
     memo, now = TransitionMemo(solver), solver.rest()
     for command in PATH[:30]:
         now = solver.step(now, float(command))
@@ -172,7 +172,7 @@ def path_times(solver: Solver) -> list[float]:
 
 def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
     """Return the median duration of a robot's step alone, in a batch on one thread, and on two [µs]."""
-    generator, robot = np.random.default_rng(0), Robot.prototype()
+    generator, robot = np.random.default_rng(0), Robot.prototype(model="paper")
     scenes = [random_scene(generator, robot, 1) for _ in range(count)]
     solvers = [Solver(robot, scene) for scene in scenes]
     batches = [BatchSolver(robot, count, 1, threads) for threads in (1, 2)]

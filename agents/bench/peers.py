@@ -56,7 +56,7 @@ def sqp_times(pulls: tuple[float, ...] = PULLS, obstacle: Circle = PUSHED) -> Js
         ``touching``; ``failures``, the number of other steps; and ``difference_mm``, the largest distance of a node
         from ours.
     """
-    robot = Robot.prototype(max_tension=math.inf)
+    robot = Robot.prototype(model="paper", max_tension=math.inf)
     solver, rival = Solver(robot, Scene([obstacle])), SqpSolver(robot, Scene([obstacle]))
     now, failures, difference = _pulled(solver, FIRST_PULL), 0, 0.0
     present, rows = rival._start(now), []
@@ -203,7 +203,7 @@ class MujocoChain:
 
 def rod() -> Robot:
     """Return the rod model of the prototype without a tension limit."""
-    return replace(Robot.prototype(max_tension=math.inf), model="rod")
+    return replace(Robot.prototype(model="paper", max_tension=math.inf), model="rod")
 
 
 def free_tip_error(cable_mm: float = 8.0) -> float:

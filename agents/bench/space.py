@@ -3,15 +3,16 @@
 import math
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from agents.bench.kernel import Timed
 from agents.files import JsonObject
-from solver import Scene, Status
+from solver import Cable, Scene, Status
 from solver.spatial import Cylinder, SpatialEquilibrium, SpatialRobot, SpatialSolver, Sphere
 
+SEGMENTS = (18, 36, 72, 144)  # the sphere of the path could slip through the edges of fewer
 STEPS_PER_SCENE = 200
 GOAL_STEPS = 50  # steps that drift towards the same goal
 LARGEST_CABLE = 11.0  # [mm]
@@ -53,17 +54,44 @@ def timed_step(solver: SpatialSolver, start: SpatialEquilibrium, cables: np.ndar
     return Timed(solver, start, cables, end, elapsed)
 
 
-def contact_mix(steps: int, seed: int = 0) -> Iterator[SpatialStep]:
+def paper(segments: int = 18) -> SpatialRobot:
+    """Return the prototype of the paper's model."""
+    return SpatialRobot.prototype(model="paper", segments=segments)
+
+
+def rod(cables: int, segments: int = 18) -> SpatialRobot:
+    """Return the prototype as a rod with a number of even cables, with two those of the paper's model."""
+    turn = 4 if cables == 2 else cables
+    around = tuple(Cable(angle=2 * math.pi * k / turn) for k in range(cables))
+    return SpatialRobot.prototype(model="rod", cables=around, segments=segments)
+
+
+def pulls(robot: SpatialRobot, bend: np.ndarray) -> np.ndarray:
+    """Return the displacements of the cables that bend a robot by displacements towards +x and +y [mm]."""
+    return bend if robot.model == "paper" else _directions(robot) @ bend
+
+
+def _bend(robot: SpatialRobot, cables_mm: np.ndarray) -> np.ndarray:
+    """Return the bend whose :func:`pulls` are nearest to displacements [mm]."""
+    return cables_mm if robot.model == "paper" else np.linalg.lstsq(_directions(robot), cables_mm, rcond=None)[0]
+
+
+def _directions(robot: SpatialRobot) -> np.ndarray:
+    return np.array([(math.cos(cable.angle), math.sin(cable.angle)) for cable in robot.cables])
+
+
+def contact_mix(steps: int, seed: int = 0, robot: SpatialRobot | None = None) -> Iterator[SpatialStep]:
     """Yield steps of random increments of ±0.3 mm with a drift towards an obstacle or, one time in five, anywhere."""
-    generator, robot = np.random.default_rng(seed), SpatialRobot.prototype()
+    generator, robot = np.random.default_rng(seed), robot or paper()
     for _ in range(steps // STEPS_PER_SCENE):
         solver = random_solver(generator, robot)
         now, goal = solver.rest(), np.zeros(2)
         for k in range(STEPS_PER_SCENE):
             if k % GOAL_STEPS == 0:
                 goal = _goal(generator, solver)
-            drift = 0.06 * (goal - now.cables_mm) + generator.uniform(-0.3, 0.3, 2)
-            step = timed_step(solver, now, np.clip(now.cables_mm + drift, -LARGEST_CABLE, LARGEST_CABLE))
+            bend = _bend(robot, now.cables_mm)
+            drift = 0.06 * (goal - bend) + generator.uniform(-0.3, 0.3, 2)
+            step = timed_step(solver, now, pulls(robot, np.clip(bend + drift, -LARGEST_CABLE, LARGEST_CABLE)))
             yield step
             now = step.end
 
@@ -94,27 +122,36 @@ def _goal(generator: np.random.Generator, solver: SpatialSolver) -> np.ndarray:
     return towards if generator.random() < 0.8 else anywhere
 
 
-def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
-    """Return the mean over a path of each step's median duration, by number of segments [µs]."""
-    return {n: float(np.median([path_times(n) for _ in range(repeats)], axis=0).mean()) for n in counts}
+def growth(robots: Sequence[SpatialRobot], repeats: int = 20) -> list[float]:
+    """Return the mean over a path of each step's median duration, for each robot [µs]."""
+    return [float(np.median([path_times(robot) for _ in range(repeats)], axis=0).mean()) for robot in robots]
 
 
-def path_times(segments: int) -> list[float]:
+def path_times(robot: SpatialRobot) -> list[float]:
     """Return the durations of the steps of a path to 8 mm and back [µs]."""
-    solver = SpatialSolver(SpatialRobot.prototype(segments=segments), Scene([PUSHED]))
+    solver = SpatialSolver(robot, Scene([PUSHED]))
     now, times = solver.rest(), []
     for pull in PATH:
-        step = timed_step(solver, now, pull * DIRECTION)
+        step = timed_step(solver, now, pulls(robot, pull * DIRECTION))
         now = step.end
         times.append(step.microseconds)
     return times
 
 
 def measure(steps: int) -> JsonObject:
-    """Return all measurements by name."""
-    means = growth((9, 18, 36, 72, 144))
+    """Return all measurements by name: of the paper's model, and of the rod."""
     return {
-        **summary(contact_mix(steps)),
-        "segments_mean_us": {str(n): mean for n, mean in means.items()},
-        "growth_exponent": float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0]),
+        "paper": summary(contact_mix(steps))
+        | grown([SpatialRobot.prototype(model="paper", segments=n) for n in SEGMENTS]),
+        "rod": summary(contact_mix(steps, robot=rod(4))) | grown([rod(4, n) for n in SEGMENTS]),
+        "rod_cables_mean_us": dict(zip("2346", growth([rod(cables) for cables in (2, 3, 4, 6)]), strict=True)),
+    }
+
+
+def grown(robots: Sequence[SpatialRobot]) -> JsonObject:
+    """Return durations of robots with growing numbers of segments, and the exponent of their growth."""
+    counts, means = [robot.segments for robot in robots], growth(robots)
+    return {
+        "segments_mean_us": {str(n): mean for n, mean in zip(counts, means, strict=True)},
+        "growth_exponent": float(np.polyfit(np.log(counts), np.log(means), 1)[0]),
     }

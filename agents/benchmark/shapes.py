@@ -19,7 +19,7 @@ def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
         if not isinstance(obstacle, HalfPlane):
             axis.fill(*obstacle.outline().T, facecolor=OBSTACLE, edgecolor="0.4")
         else:
-            axis.plot(*_plate(obstacle, nodes[:, :2]).T, color="0.4", lw=4, solid_capstyle="butt")
+            axis.plot(*plate(obstacle, nodes[:, :2]).T, color="0.4", lw=4, solid_capstyle="butt")
     for node, hole in zip(nodes, cable, strict=True):
         axis.plot([node[0], hole[0]], [node[1], hole[1]], color="0.6", lw=1)
     axis.plot(nodes[:, 0], nodes[:, 1], color=BACKBONE, lw=2.5)
@@ -52,7 +52,7 @@ def _contacts(equilibrium: Equilibrium | SpatialEquilibrium) -> np.ndarray:
     return np.asarray(equilibrium.points[touching])
 
 
-def _plate(wall: HalfPlane, backbone: np.ndarray) -> np.ndarray:
+def plate(wall: HalfPlane, backbone: np.ndarray) -> np.ndarray:
     """Return the ends of the visible part of a wall, ``(2, 2)`` [mm]: a plate if only some nodes touch it."""
     half = 200.0 if wall.nodes is None else 15.0
     touching = backbone[list(wall.nodes or range(len(backbone)))]

@@ -30,7 +30,7 @@ def pull(scene: Scene, cable_mm: float, robot: Robot = ROBOT) -> Equilibrium:
 
 def pull_in_space(cables_mm: tuple[float, float]) -> SpatialEquilibrium:
     """Return the equilibrium in space after pulling both cables (eq. 13)."""
-    solver = SpatialSolver(SpatialRobot.prototype(), Scene())
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper"), Scene())
     return solver.step(solver.rest(), cables_mm)
 
 

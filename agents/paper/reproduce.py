@@ -9,15 +9,20 @@ from agents.paper.claims import claims
 from agents.paper.comparison import scores
 from agents.paper.figures import draw_comparison, draw_figures
 from agents.paper.report import markdown, show
+from agents.paper.two_models import write_two_models
 from agents.paper.verdict import Claim
 
 
 def reproduce(folder: Path) -> list[Claim]:
-    """Write the page ``paper.md``, its figures and ``paper.json`` into a folder, print it, and return the claims."""
+    """Write the page ``paper.md``, its figures and ``paper.json`` into a folder, print it, and return the claims.
+
+    Beside it stands ``two_models.md``, six scenes in both models.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     found, scored = claims(), scores()
     draw_comparison(folder / "table_1.png")
     draw_figures(folder / "paper.png")
+    write_two_models(folder)
     values = {
         "claims": [asdict(claim) for claim in found],
         "table_1": {name: asdict(score) for name, score in scored.items()},

@@ -162,14 +162,16 @@ def _checked_cables(robot: AnyRod, space: int, usual: tuple[Cable, ...]) -> tupl
     if len(cables) > MAX_CABLES:
         raise refusal("cables", robot.cables, bound)
     for cable in cables:
-        check_instance("a cable", cable, Cable, "make it by Cable(angle=…, offset_mm=…, end=…)")
+        check_instance("an entry of cables", cable, Cable, "make it by Cable(angle=…, offset_mm=…, end=…)")
         assert isinstance(cable, Cable)
         full = _full(robot, cable)
         low, high = OFFSETS[0] * robot.longest_mm, robot.offset_mm
-        check_number("offset_mm of a cable", full.offset_mm, low, high, f"from {low:.6g} to the robot's, {high:.6g}")
-        check_whole("end of a cable", full.end, 1, robot.segments)
+        check_number(
+            "offset_mm of an entry of cables", full.offset_mm, low, high, f"from {low:.6g} to the robot's, {high:.6g}"
+        )
+        check_whole("end of an entry of cables", full.end, 1, robot.segments)
         if space == 2:
-            _check_side("angle of a cable", cable.angle)
+            _check_side("angle of an entry of cables", cable.angle)
     return tuple(cables)  # type: ignore[arg-type]
 
 
@@ -199,18 +201,18 @@ def _checked_loads(robot: AnyRod, space: int) -> tuple[Load, ...]:
     loads = check_sequence("loads", robot.loads, "a sequence of solver.Load")
     most = MOST_LOAD * robot.rigidity / robot.longest_mm**2
     for load in loads:
-        check_instance("a load", load, Load, "make it by Load(node=…, force=…)")
+        check_instance("an entry of loads", load, Load, "make it by Load(node=…, force=…)")
         assert isinstance(load, Load)
-        check_whole("node of a load", load.node, 1, robot.segments)
+        check_whole("node of an entry of loads", load.node, 1, robot.segments)
         if len(load.force) != space:
-            raise refusal("force of a load", load.force, f"{space} numbers for this robot")
+            raise refusal("force of an entry of loads", load.force, f"{space} numbers for this robot")
         bound = f"at most {most:.6g} N in size, {MOST_LOAD:g} of EI/L²"
-        check_number("a force of a load", math.hypot(*load.force), 0.0, most, bound)
+        check_number("force of an entry of loads", math.hypot(*load.force), 0.0, most, bound)
         if space == 3 and load.moment:
-            raise refusal("moment of a load", load.moment, "0 in space: take two forces")
-        check_number("moment of a load", abs(load.moment), 0.0, most * robot.longest_mm, f"{bound} times L")
+            raise refusal("moment of an entry of loads", load.moment, "0 in space: take two forces")
+        check_number("moment of an entry of loads", abs(load.moment), 0.0, most * robot.longest_mm, f"{bound} times L")
         if space == 2 and load.at[0]:
-            _check_side("angle of a load", load.at[1])
+            _check_side("angle of an entry of loads", load.at[1])
     return tuple(loads)  # type: ignore[arg-type]
 
 

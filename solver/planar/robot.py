@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
 
+from solver.common.presets import preset_fields
 from solver.common.robot import (
     check_cable_limit,
     check_disks,
@@ -34,9 +35,10 @@ class Robot:
         max_tension: Cable tension the motor can hold [N]; ``math.inf`` lifts the limit.
         max_cable_mm: Largest cable displacement [mm]; ``None`` stands for π·a, which turns the tip by 180°, but at most
             half the shortest length.
-        model: ``"paper"``, the model of the paper: every segment takes an equal share of the cable displacement and may
-            shear. ``"rod"``: the cable slides through the disks without friction and can go slack, and segments are
-            arcs (Rao 2024); with more segments this robot converges to the elastica under constant tendon tension.
+        model: ``"rod"``: cables slide through the disks without friction and can go slack, and segments are arcs
+            (Rao 2024); with more segments this robot converges to the elastica under constant tendon tension, and its
+            contact forces are those of statics. ``"paper"``, the model of the paper to the letter: every segment takes
+            an equal share of the cable displacement and may shear.
         length_range_mm: Shortest and longest length the base can insert [mm]; ``None`` for a robot of fixed length.
         touch: Lines whose points can touch obstacles: ``"backbone"``, ``"cable"``, those of all cables (both in the
             paper), and ``"rim"``, the edge of the disks on the side of −x.
@@ -62,7 +64,7 @@ class Robot:
     rigidity: float = 5000.0
     max_tension: float = 15.0
     max_cable_mm: float | None = None
-    model: Literal["paper", "rod"] = "paper"
+    model: Literal["paper", "rod"] = "rod"
     length_range_mm: tuple[float, float] | None = None
     touch: tuple[str, ...] = ("backbone", "cable")
     between: int = 0
@@ -128,6 +130,21 @@ class Robot:
             TypeError: If a field is none of the robot's.
         """
         return cls(**{"length_mm": 180.0, "segments": 18, "offset_mm": 8.0, **changes})
+
+    @classmethod
+    def preset(cls, name: str, **changes: Any) -> "Robot":
+        """Return a rod that people have, by its name in :data:`solver.PRESETS`; ``docs/model.md`` has the table.
+
+        Args:
+            name: ``"prototype"``, ``"three_cables"``, ``"rao_2021"``, ``"snake_arm"``, ``"neuroendoscope"`` or
+                ``"guidewire"``. In the plane it has a pair of opposed cables a section, the prototype a single one.
+            **changes: Fields of the robot that are to be others, such as ``segments=40``; the cables follow.
+
+        Raises:
+            ValueError: If there is no such preset, and as the robot.
+            TypeError: If a field is none of the robot's.
+        """
+        return cls(**preset_fields(name, changes, 2))
 
     def at(self, length_mm: float) -> "Robot":
         """Return the same robot, inserted to a length at rest [mm].

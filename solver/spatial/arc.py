@@ -1,125 +1,160 @@
 """Mathematics of a segment of the rod in space, stated once, in CasADi.
 
 A segment is an arc, its controls a rotation vector u: bending (the first two components, towards −y and +x) and twist,
-in radians. It rotates its upper disk by ``exp u``; its chord lies along the tangent halfway, in the direction
-``exp(u/2) e_z``, and is ``l0 sinc(b/2)`` long, where b is the size of the bending. A cable through the holes h of both
-disks is straight between them, and in the frame halfway runs along ``l0 sinc(b/2) e_z + sinc(t/2) u × h``, t = |u|.
-All is smooth at u = 0: power series in t².
+in radians. It rotates its upper disk by ``exp u``; its chord lies along the tangent halfway, ``exp(u/2) e_z``, and is
+``c = l0 sinc(b/2)`` long, where b is the size of the bending. With t = |u|, ``g = sinc(t/2)``,
+``p = (1 − cos(t/2))/t²`` and ``q = (t − sin t)/t³``:
+
+- the tangent halfway is ``p u_z u + g/2 (u_y, −u_x, 0) + (1 − p t²) e_z``;
+- ``exp u = I + g cos(t/2) [u] + g²/2 [u]²``, and a change of u turns the upper disk by ``I + g²/2 [u] + q [u]²`` times
+  it, [u] the matrix of the cross product;
+- a cable through the holes h of both disks is straight between them; in the frame halfway it runs along
+  ``c e_z + g u × h``.
+
+All is smooth at u = 0: c is a function of b², the others of t², given with their slopes.
 """
 
 import math
+from typing import NamedTuple
 
 import casadi as ca
 
 from solver.common.gap_laws import sinc_and_slopes
 
-SERIES_TERMS = 9  # of the power series of a quarter of an angle up to π
+SERIES_TERMS = 14  # of the power series of q for t up to π
 
 
-def half_rotation(square: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return ``cos t/4, sin(t/4)/t, cos t/2, sin(t/2)/t`` of ``square = t²``, smooth at zero, for t ≤ π."""
-    quarter, sine = square / 16, ca.SX(0)
-    cosine = ca.SX(0)
-    for k in reversed(range(SERIES_TERMS + 1)):
-        sine = (-1) ** k / math.factorial(2 * k + 1) + quarter * sine
-        cosine = (-1) ** k / math.factorial(2 * k) + quarter * cosine
-    return cosine, sine / 4, 1 - square * sine**2 / 8, cosine * sine / 2
+class Shared(NamedTuple):
+    """Values of a segment that several of its laws need, each with its slopes: c in b², the others in t²."""
+
+    chord: tuple[ca.SX, ca.SX, ca.SX]
+    spread: tuple[ca.SX, ca.SX, ca.SX]
+    lean: tuple[ca.SX, ca.SX, ca.SX]
+    turn: tuple[ca.SX, ca.SX]
 
 
-def turning_coefficient(square: ca.SX) -> ca.SX:
-    """Return ``(t − sin t) / t³`` of ``square = t²``, smooth at zero, for t ≤ π, by two halvings of a power series."""
-    value = ca.SX(0)
+NUMBERS = 11  # of Shared
+
+
+def shared_values(control: ca.SX, length: ca.SX) -> Shared:
+    """Return c, g, p and q of a segment, with their slopes."""
+    chord = sinc_and_slopes(ca.sumsqr(control[:2]) / 4)
+    square = ca.sumsqr(control)
+    spread = sinc_and_slopes(square / 4)
+    quarter, first, second = sinc_and_slopes(square / 16)  # p is the square of this sinc, over 8
+    turn = slope = ca.SX(0)
     for k in reversed(range(SERIES_TERMS)):
-        value = (-1) ** k / math.factorial(2 * k + 3) + square / 16 * value
-    # (1 − sinc t)/t² = (1 − sinc h)/4h² + 2 sinc h (sin(h/2)/t)², h = t/2; sinc h = 2 sin(h)/t
-    for part in (square / 4, square):
-        _, quarter_sine, _, half_sine = half_rotation(part)
-        value = value / 4 + 4 * half_sine * quarter_sine**2
-    return value
+        slope = turn + square * slope
+        turn = (-1) ** k / math.factorial(2 * k + 3) + square * turn
+    return Shared(
+        (length * chord[0], length * chord[1] / 4, length * chord[2] / 16),
+        (spread[0], spread[1] / 4, spread[2] / 16),
+        (quarter**2 / 8, quarter * first / 64, (first**2 + quarter * second) / 1024),
+        (turn, slope),
+    )
 
 
-class _Arc:
-    """Symbols of a segment of the rod, and what follows from them."""
-
-    def __init__(self) -> None:
-        self.control, self.length = ca.SX.sym("control", 3), ca.SX.sym("length")
-        self.square = ca.sumsqr(self.control)
-        self.quarter_cosine, self.quarter_sine, self.half_cosine, self.half_sine = half_rotation(self.square)
-        sincs = sinc_and_slopes(ca.sumsqr(self.control[:2]) / 4)
-        self.sizes = [self.length * sinc / 4**k for k, sinc in enumerate(sincs)]  # of the chord, and slopes in b²
-        self.size = self.sizes[0]
-
-    @property
-    def chord(self) -> ca.SX:
-        """Backbone in the frame of the lower disk, ``(3,)`` [mm]."""
-        x, y, z = ca.vertsplit(self.quarter_sine * self.control)
-        w = self.quarter_cosine
-        tangent = ca.vertcat(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
-        return ca.SX(self.size * tangent)
-
-    @property
-    def rotation(self) -> ca.SX:
-        """Rotation from the upper disk's frame to the lower one's, ``(3, 3)``."""
-        turn = ca.skew(self.control)
-        return ca.SX.eye(3) + 2 * self.half_sine * self.half_cosine * turn + 2 * self.half_sine**2 * turn @ turn
-
-    @property
-    def turning(self) -> ca.SX:
-        """Rotation of the upper disk in the frame of the lower one, per change of the control, ``(3, 3)``."""
-        turn = ca.skew(self.control)
-        return ca.SX.eye(3) + 2 * self.half_sine**2 * turn + turning_coefficient(self.square) * turn @ turn
+def _symbols() -> tuple[ca.SX, Shared]:
+    """Return symbols of the shared values, as one vector and by name."""
+    numbers = ca.SX.sym("shared", NUMBERS)
+    c, c1, c2, g, g1, g2, p, p1, p2, q, q1 = ca.vertsplit(numbers)
+    return numbers, Shared((c, c1, c2), (g, g1, g2), (p, p1, p2), (q, q1))
 
 
 def arc_function() -> ca.Function:
-    """Return ``(u, l0) → chord, rotation``, their slopes, row by row, and what :func:`cable_function` takes, ``(36,)``.
+    """Return ``(u, l0) → chord, rotation``, their slopes, row by row, and the :class:`Shared` values, ``(41,)``.
 
-    The slopes are those of the chord and of the upper disk's rotation, all in the frame of the lower disk. A cable
-    needs the length of the chord with two slopes in b², and ``sinc(t/2)`` with two in t².
+    The slopes are those of the chord and of the upper disk's rotation, all in the frame of the lower disk.
     """
-    arc = _Arc()
-    parts = arc.rotation, ca.jacobian(arc.chord, arc.control), arc.turning
-    spread = [sinc / 4**k for k, sinc in enumerate(sinc_and_slopes(arc.square / 4))]
-    law = ca.vertcat(arc.chord, *(ca.vec(part.T) for part in parts), *arc.sizes, *spread)
-    return ca.Function("ccr_spatial_arc", [arc.control, arc.length], [ca.cse(ca.densify(law))])
+    control, length = ca.SX.sym("control", 3), ca.SX.sym("length")
+    shared = shared_values(control, length)
+    (c, c1, _), (g, g1, _), (p, p1, _), (q, _) = shared
+    x, y, z = ca.vertsplit(control)
+    square, up, cross = ca.sumsqr(control), ca.vertcat(0, 0, 1), ca.skew(control)
+    aside, across = ca.vertcat(y, -x, 0), ca.vertcat(ca.horzcat(0, 1, 0), ca.horzcat(-1, 0, 0), ca.horzcat(0, 0, 0))
+    tangent = p * z * control + g / 2 * aside + (1 - p * square) * up
+    slope = 2 * p1 * z * control + g1 * aside - 2 * (p1 * square + p) * up
+    tangent_slope = slope @ control.T + p * (z * ca.SX.eye(3) + control @ up.T) + g / 2 * across
+    chord_slope = c * tangent_slope + 2 * c1 * tangent @ ca.vertcat(x, y, 0).T
+    half_cosine, twice = g + 2 * square * g1, cross @ cross
+    rotation = ca.SX.eye(3) + g * half_cosine * cross + g**2 / 2 * twice
+    turning = ca.SX.eye(3) + g**2 / 2 * cross + q * twice
+    parts = [ca.vec(part.T) for part in (rotation, chord_slope, turning)]
+    law = ca.vertcat(c * tangent, *parts, *(value for values in shared for value in values))
+    return ca.Function("ccr_spatial_arc", [control, length], [ca.cse(ca.densify(law))])
 
 
 def arc_hessian_function() -> ca.Function:
-    """Return ``(u, l0, force, moment) → Hessian in the control, row by row``, ``(9,)``.
+    """Return ``(u, shared, force, moment) → Hessian in the control, row by row``, ``(9,)``.
 
     It is that of the work of a force on the chord and of a moment on the rotation of the upper disk, in the frame of
-    the lower one.
+    the lower one; the moment's is symmetrised.
     """
-    arc, force, moment = _Arc(), ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
-    moments = ca.jacobian(arc.turning.T @ moment, arc.control)
-    hessian = ca.hessian(ca.dot(force, arc.chord), arc.control)[0] + (moments + moments.T) / 2
+    control, force, moment = (ca.SX.sym(name, 3) for name in ("control", "force", "moment"))
+    numbers, ((c, c1, c2), (g, g1, g2), (p, p1, p2), (q, q1)) = _symbols()
+    x, y, z = ca.vertsplit(control)
+    square, bent, up, one = ca.sumsqr(control), ca.vertcat(x, y, 0), ca.vertcat(0, 0, 1), ca.SX.eye(3)
+    # The force's work over c is p a + g/2 b + f_z.
+    a, b = z * ca.dot(force, control) - force[2] * square, force[0] * y - force[1] * x
+    a_slope = force * z + up * ca.dot(force, control) - 2 * force[2] * control
+    b_slope = ca.vertcat(-force[1], force[0], 0)
+    curved = 4 * (p2 * a + g2 / 2 * b) * control @ control.T + 2 * (p1 * a + g1 / 2 * b - p * force[2]) * one
+    curved += _both(control, 2 * p1 * a_slope + g1 * b_slope) + p * _both(force, up)
+    work = p * a + g / 2 * b + force[2]
+    slope = (2 * p1 * a + g1 * b) * control + p * a_slope + g / 2 * b_slope
+    hessian = c * curved + 2 * c1 * _both(bent, slope)
+    hessian += work * (2 * c1 * ca.diag(ca.vertcat(1, 1, 0)) + 4 * c2 * bent @ bent.T)
+    along = ca.dot(control, moment)
+    turned = q1 * (control * along - square * moment) - g * g1 * ca.cross(control, moment) - q / 2 * moment
+    hessian += _both(turned, control) + q * along * one
     law = ca.densify(ca.vec(hessian))
-    return ca.Function("ccr_spatial_arc_hessian", [arc.control, arc.length, force, moment], [ca.cse(law)])
+    return ca.Function("ccr_spatial_arc_hessian", [control, numbers, force, moment], [ca.cse(law)])
 
 
 def cable_function() -> ca.Function:
-    """Return ``(u, l0, hole, chord, spread) → taken, its slope, its Hessian row by row``, ``(13,)``.
+    """Return ``(u, l0, hole, shared) → taken, its slope``: what a segment takes up from a cable [mm], ``(4,)``.
 
-    It is what a segment takes up from a cable [mm]: l0 less the distance of the holes. ``chord`` and ``spread`` are
-    the last six numbers of :func:`arc_function`.
+    It is l0 less the distance of the holes.
     """
     control, length, hole = ca.SX.sym("control", 3), ca.SX.sym("length"), ca.SX.sym("hole", 2)
-    chord, spread = ca.SX.sym("chord", 3), ca.SX.sym("spread", 3)
-    bent, towards = ca.vertcat(control[:2], 0), ca.vertcat(hole[1], -hole[0], 0)
-    chord_slope = 2 * chord[1] * bent
-    chord_hessian = 2 * chord[1] * ca.diag(ca.vertcat(1, 1, 0)) + 4 * chord[2] * bent @ bent.T
-    spread_slope = 2 * spread[1] * control
-    spread_hessian = 2 * spread[1] * ca.SX.eye(3) + 4 * spread[2] * control @ control.T
-    # The cable runs `ahead` across the frame halfway, and by the twist `aside`.
-    offset, moved, twist, along = ca.sqrt(ca.sumsqr(hole)), ca.dot(control, towards), control[2], ca.vertcat(0, 0, 1)
-    ahead, aside = chord[0] + spread[0] * moved, offset * spread[0] * twist
-    ahead_slope = chord_slope + spread_slope * moved + spread[0] * towards
-    aside_slope = offset * (spread_slope * twist + spread[0] * along)
-    mixed, twisted = spread_slope @ towards.T, spread_slope @ along.T
-    ahead_hessian = chord_hessian + spread_hessian * moved + mixed + mixed.T
-    aside_hessian = offset * (spread_hessian * twist + twisted + twisted.T)
+    numbers, shared = _symbols()
+    ahead, aside, ahead_slope, aside_slope = _cable(control, hole, shared)
+    size = ca.sqrt(ahead**2 + aside**2)
+    slope = (ahead * ahead_slope + aside * aside_slope) / size
+    return ca.Function(
+        "ccr_spatial_cable", [control, length, hole, numbers], [ca.cse(ca.vertcat(length - size, -slope))]
+    )
+
+
+def cable_hessian_function() -> ca.Function:
+    """Return ``(u, hole, shared) → Hessian, row by row``, of what a segment takes up from a cable [mm], ``(9,)``."""
+    control, hole = ca.SX.sym("control", 3), ca.SX.sym("hole", 2)
+    numbers, shared = _symbols()
+    (_, c1, c2), (_, g1, g2), *_ = shared
+    ahead, aside, ahead_slope, aside_slope = _cable(control, hole, shared)
+    bent, along, one = ca.vertcat(control[:2], 0), ca.vertcat(0, 0, 1), ca.SX.eye(3)
+    spread_hessian = 2 * g1 * one + 4 * g2 * control @ control.T
+    towards, offset = ca.vertcat(hole[1], -hole[0], 0), ca.sqrt(ca.sumsqr(hole))
+    chord_hessian = 2 * c1 * ca.diag(ca.vertcat(1, 1, 0)) + 4 * c2 * bent @ bent.T
+    ahead_hessian = chord_hessian + spread_hessian * ca.dot(control, towards) + 2 * g1 * _both(control, towards)
+    aside_hessian = offset * (spread_hessian * control[2] + 2 * g1 * _both(control, along))
     size = ca.sqrt(ahead**2 + aside**2)
     slope = (ahead * ahead_slope + aside * aside_slope) / size
     hessian = ahead * ahead_hessian + aside * aside_hessian + ahead_slope @ ahead_slope.T + aside_slope @ aside_slope.T
-    hessian = (hessian - slope @ slope.T) / size
-    law = ca.densify(ca.vertcat(length - size, -slope, -ca.vec(hessian)))
-    return ca.Function("ccr_spatial_cable", [control, length, hole, chord, spread], [ca.cse(law)])
+    law = ca.densify(-ca.vec(hessian - slope @ slope.T) / size)
+    return ca.Function("ccr_spatial_cable_hessian", [control, hole, numbers], [ca.cse(law)])
+
+
+def _cable(control: ca.SX, hole: ca.SX, shared: Shared) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Return how far a cable runs ahead in the frame halfway, and by the twist aside, with their slopes."""
+    (c, c1, _), (g, g1, _), *_ = shared
+    towards, offset, twist = ca.vertcat(hole[1], -hole[0], 0), ca.sqrt(ca.sumsqr(hole)), control[2]
+    moved = ca.dot(control, towards)
+    ahead_slope = 2 * c1 * ca.vertcat(control[:2], 0) + 2 * g1 * moved * control + g * towards
+    aside_slope = offset * (2 * g1 * twist * control + g * ca.vertcat(0, 0, 1))
+    return c + g * moved, offset * g * twist, ahead_slope, aside_slope
+
+
+def _both(a: ca.SX, b: ca.SX | ca.DM) -> ca.SX:
+    """Return ``a bᵀ + b aᵀ``."""
+    return a @ b.T + b @ a.T

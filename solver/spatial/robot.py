@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from solver.common.presets import preset_fields
 from solver.common.robot import (
     check_cable_limit,
     check_disks,
@@ -85,7 +86,7 @@ class SpatialRobot:
     touch: tuple[str, ...] = ("backbone", "holes")
     rim_points: int = 16
     between: int = 0
-    model: Literal["paper", "rod"] = "paper"
+    model: Literal["paper", "rod"] = "rod"
     cables: tuple[Cable, ...] = ()
     torsion_ratio: float | tuple[float, ...] = 0.77
     segment_rigidity: tuple[float, ...] | None = None
@@ -146,6 +147,20 @@ class SpatialRobot:
             TypeError: If a field is none of the robot's.
         """
         return cls(**{"length_mm": 180.0, "segments": 18, "offset_mm": 8.0, **changes})
+
+    @classmethod
+    def preset(cls, name: str, **changes: Any) -> "SpatialRobot":
+        """Return a rod that people have, by its name in :data:`solver.PRESETS`; ``docs/model.md`` has the table.
+
+        Args:
+            name: As of :meth:`solver.Robot.preset`.
+            **changes: Fields of the robot that are to be others, such as ``segments=40``; the cables follow.
+
+        Raises:
+            ValueError: If there is no such preset, and as the robot.
+            TypeError: If a field is none of the robot's.
+        """
+        return cls(**preset_fields(name, changes, 3))
 
     @property
     def cable_limit_mm(self) -> float:

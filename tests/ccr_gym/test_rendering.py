@@ -18,7 +18,7 @@ PUSHED = Circle(center=(50, 150), radius=14)
 
 
 def pulled(obstacles: tuple[Obstacle, ...], cable_mm: float) -> Equilibrium:
-    solver = Solver(Robot.prototype(), Scene(obstacles))
+    solver = Solver(Robot.prototype(model="paper"), Scene(obstacles))
     equilibrium = solver.rest()
     for command in np.arange(0.25, cable_mm + 1e-9, 0.25):
         equilibrium = solver.step(equilibrium, float(command))

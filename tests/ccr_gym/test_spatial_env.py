@@ -85,7 +85,7 @@ def test_vector_environment_agrees_with_single_ones():
 
 
 def test_robot_and_backend_are_validated():
-    assert make().unwrapped.settings.robot == SpatialRobot.prototype()
+    assert make().unwrapped.settings.robot == SpatialRobot.prototype(model="paper")
     robot = {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0, "angle": 2.0, "between": 1}
     observation, _ = make(robot=robot, obs_mode="dict").reset(seed=0)
     assert observation["nodes"].shape == (39,)

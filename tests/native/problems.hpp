@@ -30,7 +30,7 @@ Iterate<Model> random_shape(Random& random, const RobotNumbers& of, int mounts, 
   at.controls.resize(of.segments);
   for (auto& control : at.controls) {
     control = random.matrix<Model::kControl>(size);
-    if (Model::kRod) control[0] += 0.05;
+    if (Model::kRod) control[Model::kControl / 2] += 0.05;  // towards the cable
   }
   at.mounts.resize(mounts);
   for (auto& mount : at.mounts) mount = random.matrix<Model::kSpace>(0.5);

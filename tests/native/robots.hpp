@@ -24,24 +24,38 @@ struct RobotNumbers {
   bool rod = false;
   int segments = 18;
   double length = 180, offset = 8, rigidity = 5000, max_tension = 15;
-  double angle = kQuarterTurn;  // between the cables, in space
+  double angle = kQuarterTurn;       // between the cables, in the paper's model of space
+  std::vector<double> cables = {0};  // angles of a rod's
   int between = 0;
 };
 
-// An even rod, with a cable towards +x to its tip.
+// Longest distance of neighbouring nodes of a line: of the rod beside an arc whose disks meet, of the paper's model by
+// about as much as the disks of a segment can turn.
+inline double longest_edge(const RobotNumbers& of, const Vec<2>& line) {
+  const double segment = of.length / of.segments, widest = segment / of.offset;
+  if (!of.rod) return segment + norm(line) * 0.4;
+  double longest = 0;
+  for (int k = 1; k <= 64; ++k) {
+    const double angle = widest * k / 64;
+    longest = std::max(longest, 2 * (segment / angle + norm(line)) * std::sin(angle / 2));
+  }
+  return longest;
+}
+
+// An even rod with cables to its tip.
 inline Rod make_rod(const RobotNumbers& of) {
   const std::size_t numbers = 3 * static_cast<std::size_t>(of.segments);  // in the plane a third of them serves
-  return {.cables = {{{{of.offset, 0}}, of.segments}},
-          .stiffness = std::vector<double>(numbers, 1),
-          .rest = std::vector<double>(numbers, 0)};
+  Rod rod{.cables = {}, .stiffness = std::vector<double>(numbers, 1), .rest = std::vector<double>(numbers, 0)};
+  for (const double angle : of.cables)
+    rod.cables.push_back({{{of.offset * std::cos(angle), of.offset * std::sin(angle)}}, of.segments});
+  rod.least_pull = of.cables.size() == 1 ? 0 : -kInfinity;
+  return rod;
 }
 
 // A robot with these lines of points that can touch, each a position on the disks.
 inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
-  const double segment = of.length / of.segments;
-  std::vector<double> edges;  // longer by about as much as the disks of a segment can turn
-  for (const Vec<2>& line : lines)
-    edges.push_back((segment + norm(line) * (of.rod ? segment / of.offset : 0.4)) / (of.between + 1));
+  std::vector<double> edges;
+  for (const Vec<2>& line : lines) edges.push_back(longest_edge(of, line) / (of.between + 1));
   return {.model = of.rod ? ModelKind::kPlanarRod : ModelKind::kPlanarPaper,
           .segments = of.segments,
           .offset = of.offset,
@@ -64,6 +78,7 @@ Robot make_robot(const RobotNumbers& of) {
   if (D == 2) return make_robot(of, {{{0, 0}}, {{a, 0}}});
   Robot robot = make_robot(of, {{{0, 0}}, {{a, 0}}, {{x, y}}, {{-a, 0}}, {{-x, -y}}});
   robot.model = of.rod ? ModelKind::kSpatialRod : ModelKind::kSpatialPaper;
+  for (std::size_t k = 2; k < robot.rod.stiffness.size(); k += 3) robot.rod.stiffness[k] = 0.77;  // GJ over EI
   return robot;
 }
 

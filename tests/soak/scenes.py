@@ -60,7 +60,7 @@ def make_solver(robot, scene):
 
 def planar_robot(generator, model):
     """Return the prototype, or a robot with other segments, lines and points, and a base that inserts it."""
-    robot = replace(Robot.prototype(segments=int(generator.choice([9, 18, 18, 18, 30]))), model=model)
+    robot = replace(Robot.prototype(model="paper", segments=int(generator.choice([9, 18, 18, 18, 30]))), model=model)
     if generator.random() < 0.5:
         robot = replace(robot, between=int(generator.integers(4)))
     if generator.random() < 0.3:
@@ -73,7 +73,9 @@ def planar_robot(generator, model):
 def spatial_robot(generator):
     """Return the prototype, or a robot with fewer segments, other lines, points and angles."""
     robot = SpatialRobot.prototype(
-        segments=int(generator.choice([9, 18, 18, 18])), angle=float(generator.choice([math.pi / 2, 2 * math.pi / 3]))
+        segments=int(generator.choice([9, 18, 18, 18])),
+        angle=float(generator.choice([math.pi / 2, 2 * math.pi / 3])),
+        model="paper",
     )
     if generator.random() < 0.3:
         robot = replace(robot, between=1)

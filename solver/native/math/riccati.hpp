@@ -41,8 +41,19 @@ class Riccati {
   int factor(double damping, int allowed = 0) {
     Mat<NX, NX> p;
     int negative = 0;
+    bool idle = true;  // whether no term acts on a state so far
     for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
       const Stage& s = stages[i];
+      idle = idle && node_hessian[i + 1].v == Mat<NX, NX>{}.v && s.hux.v == Mat<NU, NX>{}.v;
+      if (idle) {
+        Mat<NU, NU> quu = s.huu;
+        for (int k = 0; k < NU; ++k) quu(k, k) += damping;
+        const int pivots = factorize(quu);
+        if (pivots < 0 || (negative += pivots) > allowed) return -1;
+        factor_[i] = quu;
+        gain_[i] = {};
+        continue;
+      }
       p += node_hessian[i + 1];
       const Mat<NU, NX> btp = transpose_times(s.b, p);
       Mat<NU, NU> quu = times(btp, s.b);

@@ -34,18 +34,9 @@ Planar<Law>::Planar(const Robot& robot)
       free_bend_(1),
       adjoints_(robot.segments),
       cables_(robot.rod.cables, robot.segments) {
-  bends_evenly_ = is_bent_evenly();
-}
-
-template <class Law>
-bool Planar<Law>::is_bent_evenly() const {
-  if (!kRod) return true;
-  const Rod& rod = robot_.rod;
-  const auto all = [](const auto& values, double value) {
-    return std::all_of(values.begin(), values.end(), [&](double other) { return other == value; });
-  };
-  return rod.cables.size() == 1 && rod.cables[0].end == robot_.segments && rod.cables[0].hole[0] == robot_.offset &&
-         all(rod.stiffness, 1) && all(rod.rest, 0) && all(rod.weight.v, 0) && rod.loads.empty();
+  const Rod& rod = robot.rod;
+  has_free_form_ = !kRod || (robot.bends_evenly() && rod.cables.size() == 1 && rod.stiffness[0] == 1 &&
+                             rod.rest[0] == 0 && rod.cables[0].hole[0] == robot.offset);
 }
 
 template <class Law>
@@ -193,7 +184,7 @@ double Planar<Law>::free_slack_multiplier() const requires(kRod) {
 // All segments have the same shape, with chords at angles (i + 1/2) θ, which are reached by repeated rotation.
 template <class Law>
 Vec<3> Planar<Law>::free_slopes(const Command& command) {
-  if (!bends_evenly_) return {};
+  if (!has_free_form_) return {};
   const int n = robot_.segments;
   const double length = command.length / n;
   free_control(command);

@@ -70,13 +70,12 @@ class Planar {
   void lagrangian_hessian(System& system) const;
   Vec<kCables> displacement_slopes() const;  // of the Lagrangian in the displacement; follows propagate_adjoints
 
-  // Whether the robot that nothing touches bends alike in all segments, so that its shape is known: a rod does where
-  // one cable bends it and nothing else.
-  bool bends_evenly() const { return bends_evenly_; }
+  // Whether the shape of the robot that nothing touches is known in closed form: of the rod where one cable bends it.
+  bool has_free_form() const { return has_free_form_; }
   // Control of every segment of such a robot, and for the rod the multiplier of the slack.
   Control free_control(const Command& command);
   double free_slack_multiplier() const requires(kRod);
-  Vec<kTip> free_slopes(const Command& command);  // zero where the robot does not bend evenly
+  Vec<kTip> free_slopes(const Command& command);  // zero without the closed form
 
   const RodCables<kControl>& cables() const requires(kRod) { return cables_; }
   // Adds the slacks with their multipliers to the Lagrangian; follows propagate_adjoints.
@@ -102,11 +101,10 @@ class Planar {
   double widest = 0;               // largest angle between consecutive disks
 
  private:
-  bool is_bent_evenly() const;
   double slack_curvature(int segment) const;  // of the slacks with their multipliers, in the control
 
   Robot robot_;
-  bool bends_evenly_;
+  bool has_free_form_;
   double displacement_ = 0, length_ = 0;  // of a segment: its share of the cable, its backbone [mm]
   typename Law::Bends bends_;
   typename Law::Bends free_bend_;  // a free segment under the last command of free_control

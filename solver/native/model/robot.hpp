@@ -1,6 +1,7 @@
 // What all models share: the robot, its command, and the gap of its disks.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "math/rotations.hpp"
@@ -52,6 +53,17 @@ struct Robot {
 
   int positions() const { return segments * (between + 1) + 1; }  // of a line
   int points() const { return static_cast<int>(lines.size()) * positions(); }
+  bool loaded() const { return rod.weight.v != Vec<3>{}.v || !rod.loads.empty(); }
+  // Whether all segments of the robot that nothing touches bend alike.
+  bool bends_evenly() const {
+    const auto even = [this](const std::vector<double>& values) {
+      const std::size_t each = values.size() / segments;
+      return std::equal(values.begin() + each, values.end(), values.begin());
+    };
+    const auto whole = [this](const Cable& cable) { return cable.end == segments; };
+    return rod.cables.empty() || (std::all_of(rod.cables.begin(), rod.cables.end(), whole) && even(rod.stiffness) &&
+                                  even(rod.rest) && !loaded());
+  }
   double energy_scale(double length) const { return rigidity * segments / (2 * length); }  // EI / 2 l0 [N mm]
 };
 

@@ -12,7 +12,8 @@ void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& control
                          const Rows& adjoints, Rows& hessians);
 void bend_arc(int n, double length, const Rows& controls, Rows& bends);
 void take_cable(int n, double length, const double* hole, const Rows& controls, const Rows& bends, Rows& cable);
-void arc_hessian_contraction(int n, double length, const Rows& controls, const Rows& adjoints, Rows& hessians);
+void cable_hessian(int n, const double* hole, const Rows& controls, const Rows& bends, Rows& hessians);
+void arc_hessian_contraction(int n, const Rows& controls, const Rows& bends, const Rows& adjoints, Rows& hessians);
 }  // namespace avx2
 
 namespace {
@@ -64,12 +65,19 @@ void SpatialArcLaw::take(int n, double length, const double* hole, const Rows& c
   baseline::take_cable(n, length, hole, controls, bends, cable);
 }
 
-void SpatialArcLaw::hessian_contraction(int n, double length, const Rows& controls, const Rows& adjoints,
+void SpatialArcLaw::cable_hessian(int n, const double* hole, const Rows& controls, const Rows& bends, Rows& hessians) {
+#ifdef CCR_AVX2
+  if (has_avx2) return avx2::cable_hessian(n, hole, controls, bends, hessians);
+#endif
+  baseline::cable_hessian(n, hole, controls, bends, hessians);
+}
+
+void SpatialArcLaw::hessian_contraction(int n, const Rows& controls, const Rows& bends, const Rows& adjoints,
                                         Rows& hessians) {
 #ifdef CCR_AVX2
-  if (has_avx2) return avx2::arc_hessian_contraction(n, length, controls, adjoints, hessians);
+  if (has_avx2) return avx2::arc_hessian_contraction(n, controls, bends, adjoints, hessians);
 #endif
-  baseline::arc_hessian_contraction(n, length, controls, adjoints, hessians);
+  baseline::arc_hessian_contraction(n, controls, bends, adjoints, hessians);
 }
 
 }  // namespace ccr

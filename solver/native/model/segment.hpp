@@ -119,8 +119,8 @@ struct SpatialLaw {
 
 // The rod in space: a segment is an arc, its controls a rotation vector (see solver/spatial/arc.py).
 struct SpatialArcLaw {
-  static constexpr int kControl = 3, kBend = 36, kCable = 13, kAdjoint = 6, kHessian = 9;
-  static constexpr int kChord = 30, kSpread = 33;  // numbers of a bend that a cable takes
+  static constexpr int kControl = 3, kBend = 41, kCable = 4, kAdjoint = 6, kHessian = 9;
+  static constexpr int kFirstShared = 30, kShared = 11;  // numbers of a bend that the other laws take
 
   // Evaluates the law `ccr_spatial_arc` of n segments.
   static void bend(int n, double length, const Rows& controls, Rows& bends);
@@ -128,8 +128,11 @@ struct SpatialArcLaw {
   // Evaluates what n segments take up from a cable through a hole of the disks, by the law `ccr_spatial_cable`.
   static void take(int n, double length, const double* hole, const Rows& controls, const Rows& bends, Rows& cable);
 
+  // Hessian of what n segments take up, by the law `ccr_spatial_cable_hessian`.
+  static void cable_hessian(int n, const double* hole, const Rows& controls, const Rows& bends, Rows& hessians);
+
   // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_spatial_arc_hessian`.
-  static void hessian_contraction(int n, double length, const Rows& controls, const Rows& adjoints, Rows& hessians);
+  static void hessian_contraction(int n, const Rows& controls, const Rows& bends, const Rows& adjoints, Rows& hessians);
 };
 
 }  // namespace ccr

@@ -43,7 +43,7 @@ class SpatialPaper {
   void lagrangian_hessian(System& system) const;
   Vec<2> displacement_slopes() const;  // of the Lagrangian in the size of each displacement; follows propagate_adjoints
 
-  bool bends_evenly() const { return true; }  // the robot that nothing touches, in all segments alike
+  bool has_free_form() const { return true; }
   Vec<kTip> free_slopes(const Command& command) const;
 
   // Sine of the shear angle at which a segment folds over.

@@ -17,6 +17,7 @@ SpatialRod::SpatialRod(const Robot& robot)
       laws_(SpatialArcLaw::kBend, robot.segments),
       adjoints_(SpatialArcLaw::kAdjoint, robot.segments),
       hessians_(SpatialArcLaw::kHessian, robot.segments),
+      cable_hessians_(SpatialArcLaw::kHessian, robot.segments),
       bends_(robot.segments),
       strain_slopes_(robot.segments),
       chords_(robot.segments),
@@ -78,7 +79,7 @@ void SpatialRod::propagate_adjoints(const std::vector<State>& node_forces) {
 }
 
 void SpatialRod::lagrangian_hessian(System& system) const {
-  SpatialArcLaw::hessian_contraction(robot_.segments, length_, controls_, adjoints_, hessians_);
+  SpatialArcLaw::hessian_contraction(robot_.segments, controls_, laws_, adjoints_, hessians_);
   for (int i = 0; i < robot_.segments; ++i) {
     System::Stage& stage = system.stages[i];
     assemble_stage(bends_[i], chords_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
@@ -86,9 +87,11 @@ void SpatialRod::lagrangian_hessian(System& system) const {
     for (int k = 0; k < kControl; ++k) stage.huu(k, k) += 2 * robot_.rod.stiffness[i * kControl + k];
   }
   for (int j = 0; j < cables_.count(); ++j)
-    if (const double multiplier = cables_.multipliers()[j]; multiplier != 0)
+    if (const double multiplier = cables_.multipliers()[j]; multiplier != 0) {
+      SpatialArcLaw::cable_hessian(cables_[j].end, cables_[j].hole.v.data(), controls_, laws_, cable_hessians_);
       for (int i = 0; i < cables_[j].end; ++i)
-        for (int k = 0; k < kControl * kControl; ++k) system.stages[i].huu[k] -= multiplier * taken_[j].at(4 + k, i);
+        for (int k = 0; k < kControl * kControl; ++k) system.stages[i].huu[k] -= multiplier * cable_hessians_.at(k, i);
+    }
   system.node_hessian[robot_.segments] = {};
 }
 

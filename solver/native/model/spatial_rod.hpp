@@ -42,7 +42,7 @@ class SpatialRod {
   void lagrangian_hessian(System& system) const;
   Vec<kCables> displacement_slopes() const { return {}; }  // the tensions are the multipliers of the slacks
 
-  bool bends_evenly() const { return false; }
+  bool has_free_form() const { return false; }
   Control free_control(const Command&) const { return {}; }
   double free_slack_multiplier() const { return 0; }
   Vec<1> free_slopes(const Command&) const { return {}; }
@@ -75,7 +75,7 @@ class SpatialRod {
   struct Bend {
     Vec<3> chord;
     Mat<3, 3> rotation, chord_slope, turn_slope;
-    double chord_length[3], spread[3];
+    double shared[SpatialArcLaw::kShared];
   };
 
   static_assert(sizeof(Bend) == SpatialArcLaw::kBend * sizeof(double));
@@ -86,7 +86,7 @@ class SpatialRod {
   Robot robot_;
   double length_ = 0;  // of a segment [mm]
   Rows controls_, laws_, adjoints_;
-  mutable Rows hessians_;
+  mutable Rows hessians_, cable_hessians_;
   std::vector<Bend> bends_;
   std::vector<Control> strain_slopes_;  // slope of the objective in the controls
   std::vector<Vec<3>> chords_;          // of the segments, in the base frame

@@ -12,8 +12,7 @@ using namespace tolerances;
 // Leaves in `trial_` the shape of the free robot; false where it touched an obstacle, or would overlap one.
 template <class Model>
 bool ModelContinuation<Model>::try_free_shape() {
-  if (!problem_.bends_evenly() || problem_.touches_obstacle(trial_.active)) return false;
-  problem_.set_free_shape(trial_);
+  if (problem_.touches_obstacle(trial_.active) || !bend_freely()) return false;
   return problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
 }
 
@@ -83,7 +82,7 @@ template <class Model>
 bool ModelContinuation<Model>::left_branch(const Command& command, double moved, double loss) {
   if (moved <= kStill * problem_.robot().max_length) return false;
   // A free robot that bends evenly has but one branch, and one that is held tight has no room to jump.
-  if ((problem_.bends_evenly() && !problem_.touches_obstacle(present_.active)) || is_tight()) return false;
+  if ((bends_evenly_ && !problem_.touches_obstacle(present_.active)) || is_tight()) return false;
   if (has_trend_ && follows_trend()) return false;
   if (command.length == present_.command.length && command.loads == present_.command.loads) {
     double unevenness = 0;  // work that a tension which does not change linearly may add or take

@@ -99,7 +99,7 @@ class ContactProblem {
   void enable_barrier(bool on) { barrier_enabled_ = on; }
   bool in_barrier() const { return barrier_energy_ > 0; }  // whether a segment of the last shape is in the barrier
 
-  // Sets the equilibrium of the robot that nothing touches, which is the same in all segments.
+  // Sets the equilibrium of the robot that nothing touches, where it has a closed form.
   void set_free_shape(Iterate& at);
 
   // Computes the gradient of the Lagrangian J - Σ λ c in controls and mounts.
@@ -149,9 +149,9 @@ class ContactProblem {
   int slack_contact(int cable) const { return contacts() + cable; }
   bool is_slack(int contact) const { return contact >= contacts() && contact < first_disk_contact(); }
   int first_disk_contact() const { return contacts() + (Model::kRod ? static_cast<int>(robot_.rod.cables.size()) : 0); }
-  bool has_loads() const { return dot(robot_.rod.weight, robot_.rod.weight) > 0 || !robot_.rod.loads.empty(); }
-  bool bends_evenly() const { return model_.bends_evenly(); }  // where nothing touches
-  double lever_arm(int contact) const;                         // approximate derivative of the gap in a control [mm]
+  bool has_loads() const { return robot_.loaded(); }
+  bool has_free_form() const { return model_.has_free_form(); }  // of the shape of the robot that nothing touches
+  double lever_arm(int contact) const;                           // approximate derivative of the gap in a control [mm]
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
  private:

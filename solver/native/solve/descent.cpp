@@ -16,7 +16,7 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   const bool motor_holds = !only_releases(command);
   const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
-  if (!problem_.bends_evenly() && !problem_.touches_obstacle(present_.active)) {
+  if (!bends_evenly_ && !problem_.touches_obstacle(present_.active)) {
     before_contact_ = present_;
     at_contact_ = command;
   }

@@ -20,6 +20,19 @@ struct ModelContinuation<Model>::Pursuit {
   bool over = false;  // with `reached`
 };
 
+namespace {
+
+// One segment of a robot that bends evenly.
+Robot one_segment(Robot robot) {
+  robot.max_length /= robot.segments;
+  robot.segments = 1;
+  robot.lines = {{}};
+  for (Cable& cable : robot.rod.cables) cable.end = 1;
+  return robot;
+}
+
+}  // namespace
+
 template <class Model>
 ModelContinuation<Model>::ModelContinuation(const Robot& robot, int obstacles)
     : layout_(make_block_layout<Model>({.segments = robot.segments,
@@ -28,9 +41,12 @@ ModelContinuation<Model>::ModelContinuation(const Robot& robot, int obstacles)
                                         .positions = robot.positions(),
                                         .obstacles = obstacles})),
       newton_(robot, obstacles),
+      bends_evenly_(robot.bends_evenly()),
+      segment_(one_segment(robot), 0),
       nodes_(robot.segments + 1),
       frames_(robot.segments + 1),
       points_(robot.points()) {
+  even_.controls.resize(1);
   present_.controls.resize(robot.segments);
   trend_.controls.resize(robot.segments);
 }
@@ -112,7 +128,7 @@ void ModelContinuation<Model>::update_trend() {
   const ActiveSet &before = present_.active, &now = trial_.active;
   const double travelled = travel(present_.command, trial_.command);
   clear_trend();
-  const bool known = problem_.bends_evenly() && !problem_.touches_obstacle(now);
+  const bool known = bends_evenly_ && !problem_.touches_obstacle(now);
   if (travelled == 0 || trial_.command.length != present_.command.length || known || before.count != now.count ||
       !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
     return;
@@ -294,25 +310,6 @@ StepResult ModelContinuation<Model>::trace(const double* from, const double* tar
   const StepResult result = follow(from, target, to);
   shapes_ = nullptr;
   return result;
-}
-
-template <class Model>
-Optimality ModelContinuation<Model>::optimality(const double* block) {
-  read_block(block);
-  evaluate_present();
-  Optimality found;
-  const double length = problem_.robot().max_length;
-  for (const auto& g : problem_.gradient())
-    for (const double slope : g.v) found.stationarity = std::max(found.stationarity, std::abs(slope));
-  for (const auto& g : problem_.mount_gradient())
-    found.stationarity = std::max(found.stationarity, length / problem_.robot().segments * norm(g));
-  found.gap = problem_.violation() / length;
-  for (int j = 0; j < present_.active.count; ++j) {
-    const double gap = std::abs(problem_.gaps()[present_.active.contact[j]]);
-    found.gap = std::max(found.gap, gap / length);
-    found.complementarity = std::max(found.complementarity, gap * present_.active.multiplier[j]);
-  }
-  return found;
 }
 
 #define CCR_INSTANTIATE(Model)                                                                 \

@@ -103,6 +103,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
   // Whether a shape continues the branch.
   bool try_free_shape();
+  bool bend_freely();
   bool meets_narrow_obstacle() const;
   double energy_loss(const Command& command) const;
   bool left_branch(const Command& command, double moved, double loss);
@@ -138,6 +139,9 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   BlockLayout layout_;
   Newton<Model> newton_;
   ContactProblem& problem_ = newton_.problem;
+  bool bends_evenly_;      // whether all segments do where nothing touches,
+  Newton<Model> segment_;  // as this one does,
+  Iterate even_;           // of this shape
   Iterate present_, trial_;
   Trend<Model> trend_;  // at `present_`
   double energy_ = 0;   // of `present_`

@@ -43,6 +43,12 @@ class Newton {
   // feasible shape of no more energy, by a step of at most the size `largest`, and returns whether it `moved`.
   NewtonResult descend_once(Iterate& at, double largest);
 
+  // Whether H is positive definite at the last iterate, not only on the tangent space of the active gaps.
+  bool is_definite(const ActiveSet& active) {
+    kkt_.assemble(problem, active, 0);
+    return kkt_.factor(0) && kkt_.negative == 0;
+  }
+
   // Sets the norm of `restore` to the convexified Hessian at a shape; false where it cannot be convexified.
   bool set_metric(const Iterate& at);
   // Moves a shape as little as closes its active gaps and satisfies all others; false where that fails nearby.

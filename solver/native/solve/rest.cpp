@@ -34,10 +34,40 @@ StepResult ModelContinuation<Model>::rest(double length, double* to) {
   return finish(present_.command, to);
 }
 
+// Leaves in `trial_` the shape of the robot that nothing touches, where it bends alike in all segments: in closed form,
+// or as that of one segment. False where it does not, or would not stay so.
+template <class Model>
+bool ModelContinuation<Model>::bend_freely() {
+  if (problem_.has_free_form()) {
+    problem_.set_free_shape(trial_);
+    return true;
+  }
+  if (!bends_evenly_) return false;
+  const int n = problem_.robot().segments, cables = static_cast<int>(layout_.cables.size);
+  Iterate& one = even_;
+  for (int k = 0; k < cables; ++k) one.command.cables[k] = trial_.command.cables[k] / n;
+  one.command.length = trial_.command.length / n;
+  one.controls[0] = trial_.controls[0];
+  one.active.count = 0;
+  for (int j = 0; j < trial_.active.count; ++j)
+    if (const int contact = trial_.active.contact[j]; problem_.is_slack(contact)) {
+      one.active.contact[one.active.count] = contact - problem_.contacts();
+      one.active.multiplier[one.active.count++] = trial_.active.multiplier[j];
+    }
+  if (!segment_.solve(one, 0).converged || !segment_.is_definite(one.active)) return false;
+  const auto begin = one.active.contact.begin(), end = begin + one.active.count;
+  if (std::any_of(begin, end, [&](int contact) { return contact >= cables; })) return false;  // its disks meet
+  std::fill(trial_.controls.begin(), trial_.controls.end(), one.controls[0]);
+  std::fill(trial_.mounts.begin(), trial_.mounts.end(), Position{});
+  trial_.active = one.active;
+  for (int j = 0; j < one.active.count; ++j) trial_.active.contact[j] += problem_.contacts();
+  return true;
+}
+
 // Before the robot first touches: keeps its last shape, from which the onset of the contact is found.
 template <class Model>
 void ModelContinuation<Model>::keep_before_contact(const Iterate& next) {
-  if (problem_.bends_evenly() || problem_.touches_obstacle(present_.active)) return;
+  if (bends_evenly_ || problem_.touches_obstacle(present_.active)) return;
   if (!problem_.touches_obstacle(next.active)) return;
   before_contact_ = present_;
   at_contact_ = next.command;
@@ -46,10 +76,10 @@ void ModelContinuation<Model>::keep_before_contact(const Iterate& next) {
 // Leaves in `trial_` the robot under a command part of the way to where it touches; false where it touches.
 template <class Model>
 bool ModelContinuation<Model>::is_clear_at(const Command& start, double part) {
-  if (problem_.bends_evenly()) {
+  if (bends_evenly_) {
     trial_.command = between(start, present_.command, part);
-    problem_.set_free_shape(trial_);
-    return problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
+    return bend_freely() && problem_.evaluate(trial_) &&
+           problem_.violation() <= kFeasibility * problem_.robot().max_length;
   }
   trial_ = before_contact_;
   trial_.command = between(before_contact_.command, at_contact_, part);
@@ -69,7 +99,7 @@ ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(cons
       const double middle = (low + high) / 2;
       (clear(middle) ? low : high) = middle;
     }
-  clear(problem_.bends_evenly() ? high : low);
+  clear(bends_evenly_ ? high : low);
   problem_.reduced_gradient(trial_.active);
   Tensions tensions = problem_.tensions(trial_.active);
   if (!Model::kRod)
@@ -80,6 +110,7 @@ ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(cons
 
 #define CCR_INSTANTIATE(Model)                                                 \
   template StepResult ModelContinuation<Model>::rest(double, double*);         \
+  template bool ModelContinuation<Model>::bend_freely();                       \
   template void ModelContinuation<Model>::keep_before_contact(const Iterate&); \
   template ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)

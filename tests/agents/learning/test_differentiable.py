@@ -9,7 +9,7 @@ from solver import Circle, Robot, Scene, Sensitivity, Solver, Status
 
 @pytest.fixture
 def solver():
-    return Solver(Robot.prototype(), Scene([Circle(center=(44, 104), radius=15)]))
+    return Solver(Robot.prototype(model="paper"), Scene([Circle(center=(44, 104), radius=15)]))
 
 
 def answers(solver, cables):
@@ -69,7 +69,7 @@ def test_a_set_point_is_found_by_gradient_descent(solver):
 
 
 def test_no_gradient_where_the_cable_does_not_follow():
-    robot = Robot.prototype(max_tension=1.0)
+    robot = Robot.prototype(model="paper", max_tension=1.0)
     solver = Solver(robot, Scene())
     cable = torch.tensor([13.0], dtype=torch.float64, requires_grad=True)
     equilibria = answers(solver, cable.detach())

@@ -1,5 +1,7 @@
 """Table 1 beside four predictions, and beside a beam that shares nothing with the solver."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -8,6 +10,7 @@ from scipy.optimize import brentq, fsolve
 from agents.paper import comparison, published
 from agents.paper.comparison import COLUMN, GRAM_FORCE, NULL, score
 from agents.paper.model import ROBOT, ROD
+from agents.paper.report import row
 
 # design section 3, measured by an earlier prototype of both models: mean F/P_l, error, error with the best factor [gf]
 DESIGN = {
@@ -112,3 +115,9 @@ def test_form_rules_the_paper_model_out_and_level_does_not():
     assert min(found.fitted for found in shear) > 2.8
     assert np.ptp([found.ratio for found in rod]) < 0.009
     assert max(found.fitted for found in rod) < 1.0
+
+
+def test_docs_have_these_scores(scored):
+    page = (Path(__file__).parents[3] / "docs" / "model.md").read_text()
+    for name, found in scored.items():
+        assert "| " + " | ".join(row(name, found)) + " |" in page

@@ -140,3 +140,4 @@ def test_the_command_writes_a_page_and_a_verdict_on_every_claim(tmp_path, monkey
     assert "cannot be" in capsys.readouterr().out
     for picture in ("table_1.png", "paper.png"):
         assert (tmp_path / picture).stat().st_size > 30_000
+    assert (tmp_path / "two_models" / "circle.png").exists()

@@ -109,7 +109,7 @@ def test_capacity(solver, capacity):
 
 
 def test_only_solvers_are_wrapped():
-    for stranger in (None, 3, Scene(), Robot.prototype()):
+    for stranger in (None, 3, Scene(), Robot.prototype(model="paper")):
         with pytest.raises(TypeError, match=r"it must be a solver: it needs rest\(\), step\(\), check_command\(\)"):
             TransitionMemo(stranger)
 
@@ -117,6 +117,6 @@ def test_only_solvers_are_wrapped():
 @pytest.mark.parametrize("make", [ReferenceSolver, SpatialReferenceSolver])
 def test_reference_solvers_are_solvers(make):
     """The reference solvers can be wrapped like the others."""
-    robot = Robot.prototype() if make is ReferenceSolver else SpatialRobot.prototype()
+    robot = Robot.prototype(model="paper") if make is ReferenceSolver else SpatialRobot.prototype(model="paper")
     memo = TransitionMemo(make(robot, Scene()))
     assert memo.rest().status == 0

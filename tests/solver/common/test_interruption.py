@@ -75,7 +75,7 @@ def test_ctrl_c_amid_a_step_of_a_batch_leaves_the_robot_where_it_was(count, thre
 
 
 def test_ctrl_c_ends_a_long_pull():
-    batch = SpatialBatchSolver(SpatialRobot.prototype(segments=90), 1, 1)
+    batch = SpatialBatchSolver(SpatialRobot.prototype(model="paper", segments=90), 1, 1)
     batch.assign(0, Scene([Sphere(center=(25, 25, 104), radius=15)]))
     direction = np.array([[1.0, 0.0]])
     assert lateness(lambda: batch.ramp_reaches_force([0], np.array([10.0]), 1e-4, 9.0, direction)) < 1

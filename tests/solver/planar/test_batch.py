@@ -25,7 +25,7 @@ def circles(generator, count):
 @EVERY_MODEL
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_every_robot_moves_as_alone(model, threads):
-    robot, generator = replace(Robot.prototype(), model=model), np.random.default_rng(4)
+    robot, generator = replace(Robot.prototype(model="paper"), model=model), np.random.default_rng(4)
     scenes = [Scene([circle]) for circle in circles(generator, 37)]
     batch = BatchSolver(robot, len(scenes), 1, threads)
     for i, scene in enumerate(scenes):
@@ -44,7 +44,7 @@ def test_every_robot_moves_as_alone(model, threads):
 
 
 def test_some_move_and_the_others_stay():
-    batch = BatchSolver(Robot.prototype(), 4, 0)
+    batch = BatchSolver(Robot.prototype(model="paper"), 4, 0)
     for i in range(4):
         batch.assign(i, Scene())
     batch.rest(range(4))
@@ -56,12 +56,12 @@ def test_some_move_and_the_others_stay():
 def test_reaches_is_a_steady_pull():
     generator = np.random.default_rng(0)
     scenes = [Scene([circle]) for circle in circles(generator, 60)]
-    batch, forces = BatchSolver(Robot.prototype(), 60, 1), generator.uniform(0.02, 0.3, 60)
+    batch, forces = BatchSolver(Robot.prototype(model="paper"), 60, 1), generator.uniform(0.02, 0.3, 60)
     for i, scene in enumerate(scenes):
         batch.assign(i, scene)
     found, ends = batch.ramp_reaches_force(range(60), forces, 0.5, 14.0)
     for scene, force, reached, end in zip(scenes, forces, found, ends, strict=True):
-        solver = Solver(Robot.prototype(), scene)
+        solver = Solver(Robot.prototype(model="paper"), scene)
         now, expected = solver.rest(), False
         for command in np.arange(0.5, 14, 0.5):
             now = solver.step(now, command)
@@ -80,7 +80,7 @@ import os
 import numpy as np
 from solver import Robot, Scene
 from solver.planar.batch import BatchSolver
-batch = BatchSolver(Robot.prototype(), 64, 0, threads=2)
+batch = BatchSolver(Robot.prototype(model="paper"), 64, 0, threads=2)
 for i in range(64):
     batch.assign(i, Scene())
 batch.rest(range(64))
@@ -102,8 +102,8 @@ def test_a_forked_process_has_threads_of_its_own():
 def test_what_it_refuses():
     for arguments, message in (((0, 1), "count is 0"), ((2, 1, 0), "threads is 0")):
         with pytest.raises(ValueError, match=message):
-            BatchSolver(Robot.prototype(), *arguments)
-    batch = BatchSolver(Robot.prototype(), 2, 1)
+            BatchSolver(Robot.prototype(model="paper"), *arguments)
+    batch = BatchSolver(Robot.prototype(model="paper"), 2, 1)
     with pytest.raises(ValueError, match="scene has 0 obstacles; each of the batch's has 1"):
         batch.assign(0, Scene())
     batch.assign(0, Scene([Circle(center=(44, 104), radius=15)]))
@@ -114,7 +114,7 @@ def test_what_it_refuses():
 
 
 def test_a_probe_tells_where_a_step_would_lead_and_moves_nothing():
-    robot, generator = Robot.prototype(), np.random.default_rng(5)
+    robot, generator = Robot.prototype(model="paper"), np.random.default_rng(5)
     batch = BatchSolver(robot, 9, 1)
     for i, circle in enumerate(circles(generator, 9)):
         batch.assign(i, Scene([circle]))
@@ -133,7 +133,7 @@ def test_a_probe_tells_where_a_step_would_lead_and_moves_nothing():
 
 def crowd(count, segments, threads=1):
     """Robots at rest, all before the same circle, whose step takes a while when they are many and finely divided."""
-    batch = BatchSolver(replace(Robot.prototype(), segments=segments), count, 1, threads)
+    batch = BatchSolver(replace(Robot.prototype(model="paper"), segments=segments), count, 1, threads)
     scene = Scene([Circle(center=(44, 104), radius=15)])
     for i in range(count):
         batch.assign(i, scene)
@@ -143,7 +143,7 @@ def crowd(count, segments, threads=1):
 
 @EVERY_MODEL
 def test_optimality(model):
-    robot, generator = replace(Robot.prototype(), model=model), np.random.default_rng(6)
+    robot, generator = replace(Robot.prototype(model="paper"), model=model), np.random.default_rng(6)
     scenes = [Scene([circle]) for circle in circles(generator, 9)]
     batch, solvers = BatchSolver(robot, 9, 1), [Solver(robot, scene) for scene in scenes]
     for i, scene in enumerate(scenes):
@@ -164,7 +164,7 @@ def test_optimality(model):
 @EVERY_MODEL
 def test_optimality_of_what_is_no_equilibrium(model):
     """A robot whose segments are bent a little otherwise, or whose contact pushes harder, than it should."""
-    robot, scene = replace(Robot.prototype(), model=model), Scene([Circle(center=(44, 104), radius=15)])
+    robot, scene = replace(Robot.prototype(model="paper"), model=model), Scene([Circle(center=(44, 104), radius=15)])
     batch, solver = BatchSolver(robot, 3, 1), Solver(robot, scene)
     for i in range(3):
         batch.assign(i, scene)
@@ -217,7 +217,8 @@ import numpy as np
 from solver import Circle, Robot, Scene
 from solver.planar.batch import BatchSolver
 
-robot, scene = Robot(length_mm=180, segments=200, offset_mm=8), Scene([Circle(center=(44, 104), radius=15)])
+robot = Robot(model="paper", length_mm=180, segments=200, offset_mm=8)
+scene = Scene([Circle(center=(44, 104), radius=15)])
 count = 4000
 batch = BatchSolver(robot, count, 1, threads=THREADS)
 for i in range(count):
@@ -275,7 +276,7 @@ def test_robots_whose_rest_was_cut_short_do_not_move_until_they_rest(monkeypatch
 
 
 def test_a_block_that_no_robot_can_have_stays_as_it_is():
-    batch = BatchSolver(Robot.prototype(), 1, 0)
+    batch = BatchSolver(Robot.prototype(model="paper"), 1, 0)
     batch.assign(0, Scene())
     batch.rest([0])
     batch.blocks[:] = 1e300

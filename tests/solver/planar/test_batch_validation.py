@@ -14,7 +14,7 @@ from solver.planar.batch import BatchSolver
 
 @pytest.fixture
 def batch(circles):
-    made = BatchSolver(Robot.prototype(), 4, 1)
+    made = BatchSolver(Robot.prototype(model="paper"), 4, 1)
     for k in range(4):
         made.assign(k, circles((44 + k, 104, 15)))
     made.rest(range(4))
@@ -137,13 +137,13 @@ def test_trial_pulls(batch, change, message):
 )
 def test_what_a_batch_is_made_of(arguments, message):
     with pytest.raises(ValueError, match=message):
-        BatchSolver(Robot.prototype(), *arguments)
+        BatchSolver(Robot.prototype(model="paper"), *arguments)
     with pytest.raises(TypeError, match="robot is None; it must be a Robot"):
         BatchSolver(None, 1, 1)
 
 
 def test_a_batch_answers_only_for_robots_that_are_assigned(circles):
-    batch = BatchSolver(Robot.prototype(), 2, 1)
+    batch = BatchSolver(Robot.prototype(model="paper"), 2, 1)
     batch.assign(0, circles((44, 104, 15)))
     for call in (
         lambda: batch.rest([0, 1]),

@@ -31,7 +31,7 @@ def walk(solver, equilibrium, cables):
 
 
 def test_stall(circles, pulls):
-    robot = Robot.prototype()
+    robot = Robot.prototype(model="paper")
     solver = Solver(robot, circles(*BLOCKING))
     equilibrium = solver.rest()
     for cable in pulls(14.0, 0.25):
@@ -48,7 +48,7 @@ def test_stall(circles, pulls):
 
 
 def test_release_from_a_stall(circles, pulls):
-    solver = Solver(Robot.prototype(), circles(*BLOCKING))
+    solver = Solver(Robot.prototype(model="paper"), circles(*BLOCKING))
     stalled = walk(solver, solver.rest(), pulls(14.0, 0.25))
     released = walk(solver, stalled, np.arange(math.floor(stalled.cable_mm * 4), -1, -1) * 0.25)
     assert released.status is Status.CONVERGED
@@ -57,7 +57,7 @@ def test_release_from_a_stall(circles, pulls):
 
 
 def test_blocked(circles, pulls):
-    solver = Solver(Robot.prototype(max_tension=math.inf), circles(*BLOCKING))
+    solver = Solver(Robot.prototype(model="paper", max_tension=math.inf), circles(*BLOCKING))
     blocked = walk(solver, solver.rest(), pulls(14.0, 0.25))
     assert blocked.status is Status.BLOCKED
     assert 12 < blocked.cable_mm < 13
@@ -72,7 +72,7 @@ def test_blocked(circles, pulls):
 @pytest.mark.parametrize("pair", SLIPPERY)
 def test_snap(pair, step, circles, pulls, swept, clearance):
     scene = circles(*pair)
-    robot = Robot.prototype(max_tension=math.inf)
+    robot = Robot.prototype(model="paper", max_tension=math.inf)
     solver = Solver(robot, scene)
     equilibrium, statuses = solver.rest(), []
     for cable in [*pulls(14.0, step), 14.0]:
@@ -89,7 +89,7 @@ def test_snap(pair, step, circles, pulls, swept, clearance):
 
 
 def test_large_increments_do_not_sweep(random_scene, swept, clearance):
-    generator, robot = np.random.default_rng(7), Robot.prototype()
+    generator, robot = np.random.default_rng(7), Robot.prototype(model="paper")
     for _ in range(60):
         scene = random_scene(generator)
         solver = Solver(robot, scene)
@@ -104,7 +104,7 @@ def test_large_increments_do_not_sweep(random_scene, swept, clearance):
 
 
 def test_touching_robot_keeps_its_pretension():
-    solver = Solver(Robot.prototype(), Scene([HalfPlane(point=(8.001, 0), normal=(-1, 0))]))
+    solver = Solver(Robot.prototype(model="paper"), Scene([HalfPlane(point=(8.001, 0), normal=(-1, 0))]))
     pulled = walk(solver, solver.rest(), [0.5])
     assert pulled.contact.any()
     slack = walk(solver, pulled, [0.0])
@@ -114,7 +114,7 @@ def test_touching_robot_keeps_its_pretension():
 
 
 def test_trace_begins_and_ends_with_the_equilibria_of_the_step():
-    robot = replace(Robot.prototype(), touch=LINES, between=1)
+    robot = replace(Robot.prototype(model="paper"), touch=LINES, between=1)
     solver = Solver(robot, Scene([Circle(center=(33, 89), radius=12.5, spring=0.5)]))
     before = walk(solver, solver.rest(), [3.0, 6.0])
     after, trace = solver.step(before, 9.0), solver.trace(before, 9.0)
@@ -128,7 +128,7 @@ def test_trace_begins_and_ends_with_the_equilibria_of_the_step():
 
 def test_steps_are_pure(circles):
     scene = circles(*BLOCKING)
-    solver, other = (Solver(Robot.prototype(), scene) for _ in range(2))
+    solver, other = (Solver(Robot.prototype(model="paper"), scene) for _ in range(2))
     equilibrium = walk(solver, solver.rest(), [3.0, 6.0])
     block = equilibrium.block.copy()
     first = solver.step(equilibrium, 9.0)
@@ -140,14 +140,16 @@ def test_steps_are_pure(circles):
 
 def test_an_equilibrium_serves_equal_solvers():
     scene = Scene([Circle(center=(33, 89), radius=12.5)])
-    equilibrium = Solver(Robot.prototype(), scene).rest()
-    assert Solver(Robot.prototype(), Scene(list(scene))).step(equilibrium, 2.0).status is Status.CONVERGED
+    equilibrium = Solver(Robot.prototype(model="paper"), scene).rest()
+    assert Solver(Robot.prototype(model="paper"), Scene(list(scene))).step(equilibrium, 2.0).status is Status.CONVERGED
 
 
 def test_far_obstacles_change_nothing(circles):
     """Those out of reach are passed over on the way, and measured in the answer."""
     near, far = BLOCKING[:1], [(60 + 12 * k, -30 - 5 * k, 6.0) for k in range(31)]
-    alone, crowded = (Solver(Robot.prototype(), circles(*obstacles)) for obstacles in (near, (*near, *far)))
+    alone, crowded = (
+        Solver(Robot.prototype(model="paper"), circles(*obstacles)) for obstacles in (near, (*near, *far))
+    )
     one, many = alone.rest(), crowded.rest()
     for cable in (4.0, 8.0, 11.0, 9.0):
         one, many = alone.step(one, cable), crowded.step(many, cable)
@@ -162,7 +164,7 @@ def test_far_obstacles_change_nothing(circles):
 @pytest.mark.parametrize("center", [(30, 120), (45, 150), (60, 110), (24, 70)])
 def test_a_thin_peg_does_not_slip_between_nodes(center, touch, circles, pulls, swept):
     peg = circles((*center, 0.5))
-    coarse = {"length_mm": 180.0, "segments": 10, "offset_mm": 8.0, "touch": touch}
+    coarse = {"model": "paper", "length_mm": 180.0, "segments": 10, "offset_mm": 8.0, "touch": touch}
     with pytest.raises(ValueError, match=r"radius 0.5 mm; it could slip between points .* between=(18|27) or more"):
         Solver(Robot(**coarse), peg)
     robot = Robot(**coarse, between=29)
@@ -183,7 +185,7 @@ def test_lines_that_touch():
     """Gaps of a wall 20 mm behind the straight robot, to each line of points alone."""
     wall = Scene([HalfPlane(point=(-20, 0), normal=(1, 0))])
     for line, gap in (("backbone", 20.0), ("cable", 28.0), ("rim", 12.0)):
-        robot = Robot(length_mm=180, segments=18, offset_mm=8, touch=(line,), between=2)
+        robot = Robot(model="paper", length_mm=180, segments=18, offset_mm=8, touch=(line,), between=2)
         rest = Solver(robot, wall).rest()
         assert rest.gaps.shape == (1, 1, 55)
         assert rest.gaps == pytest.approx(gap)
@@ -192,7 +194,7 @@ def test_lines_that_touch():
 
 def test_motor_yields_where_a_release_snaps_to_more_tension_than_it_holds(pulls):
     wall = HalfPlane(point=(54.9, 116.64), normal=(-0.81685, -0.57684))
-    robot = Robot(length_mm=180, segments=18, offset_mm=8, touch=LINES, between=3)
+    robot = Robot(model="paper", length_mm=180, segments=18, offset_mm=8, touch=LINES, between=3)
     solver = Solver(robot, Scene([wall, Circle(center=(50.24, 112.21), radius=10.99)]))
     hooked = walk(solver, solver.rest(), pulls(12.75, 0.25))
     released = solver.step(hooked, hooked.cable_mm - 0.1)
@@ -205,7 +207,7 @@ def test_motor_yields_where_a_release_snaps_to_more_tension_than_it_holds(pulls)
 @pytest.mark.parametrize(("x", "release"), [(67.05, 0.03), (67.1, 0.1), (67.4, 0.31)])
 def test_a_tip_that_rolls_onto_a_circle_is_not_taken_for_blocked(x, release):
     """Two gaps close at the end of the descent, which costs more energy than is left to win."""
-    robot = replace(Robot.prototype(), model="rod")
+    robot = replace(Robot.prototype(model="paper"), model="rod")
     solver = Solver(robot, Scene([Circle(center=(x, 132.6), radius=13.7)]))
     state = walk(solver, solver.rest(), np.arange(0.5, 12, 0.5).tolist())
     statuses = set()
@@ -231,7 +233,7 @@ SMALL_SNAPS = [  # cable, circles, where the step of 0.5 mm begins and ends [mm]
 @pytest.mark.parametrize(("model", "obstacles", "start", "end"), SMALL_SNAPS, ids=["released", "pulled"])
 def test_a_small_snap_within_a_step_is_told(model, obstacles, start, end, circles, pulls):
     """Of 1.4 and 2.4 mm, no more than the robot moves along its branch in the same step."""
-    solver = Solver(replace(Robot.prototype(), model=model), circles(*obstacles))
+    solver = Solver(replace(Robot.prototype(model="paper"), model=model), circles(*obstacles))
     before = walk(solver, solver.rest(), pulls(start, 0.5))
     fine, statuses = before, set()
     for part in np.linspace(start, end, 101)[1:]:
@@ -248,7 +250,7 @@ def test_a_small_snap_within_a_step_is_told(model, obstacles, start, end, circle
 def test_a_large_step_ends_where_small_ones_do(model, random_scene):
     generator = np.random.default_rng(11)
     for _ in range(12):
-        solver = Solver(replace(Robot.prototype(), model=model), random_scene(generator))
+        solver = Solver(replace(Robot.prototype(model="paper"), model=model), random_scene(generator))
         equilibrium = solver.rest()
         for change in generator.choice([-0.5, 0.5], 24, p=[0.3, 0.7]):
             cable_mm = float(np.clip(equilibrium.cable_mm + change, 0, 14))

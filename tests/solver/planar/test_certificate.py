@@ -39,7 +39,7 @@ def follow(solver, changes):
 @settings(max_examples=40)
 @given(scene=scenes, start=st.floats(1, 8), changes=increments)
 def test_residuals(model, scene, start, changes):
-    robot = replace(Robot.prototype(), model=model, length_range_mm=(SHORTEST, LONGEST))
+    robot = replace(Robot.prototype(model="paper"), model=model, length_range_mm=(SHORTEST, LONGEST))
     certify(follow(Solver(robot, scene), [(start, 0.0), *changes]))
 
 
@@ -48,7 +48,7 @@ def test_residuals(model, scene, start, changes):
     ("touch", "scenes"), [({}, 60), ({"touch": LINES, "between": 3}, 20)], ids=["paper", "everywhere"]
 )
 def test_residuals_of_every_shape(random_shapes, model, touch, scenes):
-    robot, generator = replace(Robot.prototype(), model=model, **touch), np.random.default_rng(3)
+    robot, generator = replace(Robot.prototype(model="paper"), model=model, **touch), np.random.default_rng(3)
     touched, springs = set(), 0
     for _ in range(scenes):
         scene = random_shapes(generator, robot)
@@ -77,7 +77,9 @@ def certify(equilibria):
 @settings(max_examples=8)
 @given(scene=scenes, changes=st.lists(st.tuples(st.floats(0.1, 0.5), st.floats(-1, 1)), min_size=24, max_size=40))
 def test_reference_solver(model, scene, changes):
-    robot = replace(Robot.prototype(max_tension=math.inf), model=model, length_range_mm=(SHORTEST, LONGEST))
+    robot = replace(
+        Robot.prototype(model="paper", max_tension=math.inf), model=model, length_range_mm=(SHORTEST, LONGEST)
+    )
     solver, reference = Solver(robot, scene), ReferenceSolver(robot, scene)
     before = solver.step(solver.rest(), 1.0, 175.0)
     asked, answered = 0, 0

@@ -40,7 +40,9 @@ def test_a_custom_ellipse_is_the_ellipse():
     assert custom.normal_at(points) == pytest.approx(ellipse.normal_at(points), abs=1e-12)
     assert custom.extent.inradius == pytest.approx(ellipse.extent.inradius, rel=5e-3)
     assert custom.extent.min_curvature_radius == pytest.approx(ellipse.extent.min_curvature_radius, rel=1e-2)
-    for ours, theirs in zip(pulled(Robot.prototype(), custom), pulled(Robot.prototype(), ellipse), strict=True):
+    for ours, theirs in zip(
+        pulled(Robot.prototype(model="paper"), custom), pulled(Robot.prototype(model="paper"), ellipse), strict=True
+    ):
         assert ours.nodes == pytest.approx(theirs.nodes, abs=1e-9)
         assert ours.multipliers == pytest.approx(theirs.multipliers, abs=1e-12)
 
@@ -48,7 +50,7 @@ def test_a_custom_ellipse_is_the_ellipse():
 @EVERY_MODEL
 @pytest.mark.parametrize("spring", [None, 0.5])
 def test_certificate(model, spring):
-    states = list(pulled(replace(Robot.prototype(), model=model), egg(spring=spring)))
+    states = list(pulled(replace(Robot.prototype(model="paper"), model=model), egg(spring=spring)))
     assert states[-1].contact.any()
     for state in states:
         assert state.status is Status.CONVERGED
@@ -58,19 +60,19 @@ def test_certificate(model, spring):
 def test_the_reference_solver_needs_no_compiler(monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     shape = egg(family=Family.trace(lambda point, _: point[0] ** 2 + 2 * point[1] ** 2 - 200), sizes=())
-    reference = list(pulled(Robot.prototype(), shape, ReferenceSolver))[-1]
+    reference = list(pulled(Robot.prototype(model="paper"), shape, ReferenceSolver))[-1]
     assert reference.status is Status.CONVERGED
     with pytest.raises(RuntimeError, match=r"no C compiler found \(tried no-such-compiler\)"):
-        Solver(Robot.prototype(), Scene([shape]))
+        Solver(Robot.prototype(model="paper"), Scene([shape]))
     monkeypatch.undo()
-    assert list(pulled(Robot.prototype(), shape))[-1].nodes == pytest.approx(reference.nodes, abs=1e-6)
+    assert list(pulled(Robot.prototype(model="paper"), shape))[-1].nodes == pytest.approx(reference.nodes, abs=1e-6)
 
 
 def test_a_compiler_that_fails_is_named(monkeypatch):
     monkeypatch.setenv("CC", "false")
     with pytest.raises(RuntimeError, match=r"false .* failed"):
         Solver(
-            Robot.prototype(),
+            Robot.prototype(model="paper"),
             Scene([egg(family=Family.trace(lambda point, _: point[0] ** 2 + point[1] ** 2 - 90), sizes=())]),
         )
 
@@ -78,13 +80,19 @@ def test_a_compiler_that_fails_is_named(monkeypatch):
 @pytest.mark.parametrize("command", ["", "  "])
 def test_an_empty_name_of_a_compiler_is_none(monkeypatch, command):
     monkeypatch.setenv("CC", command)
-    Solver(Robot.prototype(), Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + 3 * p[1] ** 2 - 90), sizes=())]))
+    Solver(
+        Robot.prototype(model="paper"),
+        Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + 3 * p[1] ** 2 - 90), sizes=())]),
+    )
 
 
 def test_quotes_that_do_not_close_are_no_compiler(monkeypatch):
     monkeypatch.setenv("CC", "gcc '")
     with pytest.raises(RuntimeError, match=r"no C compiler found \(tried gcc '\)"):
-        Solver(Robot.prototype(), Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + p[1] ** 2 - 91), sizes=())]))
+        Solver(
+            Robot.prototype(model="paper"),
+            Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + p[1] ** 2 - 91), sizes=())]),
+        )
 
 
 NOEXEC = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
@@ -113,7 +121,7 @@ SOLVE = """
 from solver import Custom, Family, Robot, Scene, Solver
 family = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
 shape = Custom(family=family, sizes=(14, 9), center=(44, 104), reach=16)
-solver = Solver(Robot.prototype(), Scene([shape]))
+solver = Solver(Robot.prototype(model="paper"), Scene([shape]))
 print(solver.step(solver.rest(), 8.0).tension.hex())
 """
 
@@ -138,9 +146,9 @@ def test_a_damaged_library_is_rebuilt(tmp_path, damage):
 def test_families_of_one_expression_share_a_library():
     again = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
     assert again == ELLIPSE
-    Solver(Robot.prototype(), Scene([Custom(family=ELLIPSE, sizes=(15, 9), reach=16, **PLACE)]))
+    Solver(Robot.prototype(model="paper"), Scene([Custom(family=ELLIPSE, sizes=(15, 9), reach=16, **PLACE)]))
     built = store().statistics.builds
-    Solver(Robot.prototype(), Scene([Custom(family=again, sizes=(11, 10), reach=16, **PLACE)]))
+    Solver(Robot.prototype(model="paper"), Scene([Custom(family=again, sizes=(11, 10), reach=16, **PLACE)]))
     assert store().statistics.builds == built
 
 

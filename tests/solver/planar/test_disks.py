@@ -152,7 +152,7 @@ def test_sensitivities_hold_the_disks_that_meet(radius, thickness, before, after
 
 
 def test_a_cable_that_shears_its_segments_has_no_disks_that_meet():
-    robot = Robot.prototype()
+    robot = Robot.prototype(model="paper")
     assert robot_inequality_count(robot) == 0
     assert Solver(robot, Scene()).rest().disk_multipliers.size == 0
 

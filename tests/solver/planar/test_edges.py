@@ -34,7 +34,7 @@ def cost(solver, cable_mm, repeats=20):
 
 @pytest.mark.parametrize("steps", [1, 3, 400])
 def test_a_circle_does_not_pass_between_the_points_on_the_way_to_a_far_command(steps):
-    solver = Solver(Robot.prototype(), Scene([Circle(center=(30.6, 160.8), radius=5.25)]))
+    solver = Solver(Robot.prototype(model="paper"), Scene([Circle(center=(30.6, 160.8), radius=5.25)]))
     end = walk(solver, np.linspace(0, 11.3, steps + 1)[1:])[-1]
     assert end.status is Status.STALLED
     assert end.cable_mm == pytest.approx(9.81159, abs=1e-4)
@@ -44,7 +44,7 @@ def test_a_circle_does_not_pass_between_the_points_on_the_way_to_a_far_command(s
 
 @pytest.mark.parametrize("increment", [0.05, 0.5])
 def test_a_circle_at_the_tip_is_rolled_over_and_not_passed_through(increment):
-    solver = Solver(Robot.prototype(), Scene([Circle(center=(14.2, 173.9), radius=5.5)]))
+    solver = Solver(Robot.prototype(model="paper"), Scene([Circle(center=(14.2, 173.9), radius=5.5)]))
     states = walk(solver, np.arange(1, round(9 / increment) + 1) * increment)
     halfway = states[len(states) // 2]
     assert halfway.cable_mm == pytest.approx(4.5)
@@ -62,7 +62,7 @@ def test_a_circle_at_the_tip_is_rolled_over_and_not_passed_through(increment):
 def triangle(radius):
     """The prototype before a triangle with corners of a radius [mm]; None where that is refused."""
     try:
-        return Solver(Robot.prototype(), Scene([Polygon(corners=TRIANGLE, radius=radius)]))
+        return Solver(Robot.prototype(model="paper"), Scene([Polygon(corners=TRIANGLE, radius=radius)]))
     except ValueError:
         return None
 
@@ -88,7 +88,9 @@ def test_a_corner_costs_no_more_than_a_round_one(radius):
 
 def test_the_end_of_a_long_ellipse_costs_no_more_than_that_of_a_short_one():
     short, long = (Scene([Ellipse(center=(55, 90), radii=(half, 10), axis=(0, 1))]) for half in (1e2, 1e4))
-    short_one, long_one = (cost(Solver(Robot.prototype(), scene), 12.0, repeats=8) for scene in (short, long))
+    short_one, long_one = (
+        cost(Solver(Robot.prototype(model="paper"), scene), 12.0, repeats=8) for scene in (short, long)
+    )
     assert long_one <= 3 * short_one
 
 
@@ -118,7 +120,7 @@ NARROW = {
 
 @pytest.mark.parametrize(("scene", "cable"), NARROW.values(), ids=NARROW)
 def test_large_steps_end_where_small_ones_do(scene, cable):
-    solver = Solver(Robot.prototype(), scene)
+    solver = Solver(Robot.prototype(model="paper"), scene)
     small = walk(solver, np.linspace(0, cable, 401)[1:])
     assert {state.status for state in small} == {Status.CONVERGED}
     for steps in (1, 2, 5, 12, 25, 50):
@@ -132,7 +134,9 @@ def test_large_steps_end_where_small_ones_do(scene, cable):
 @pytest.mark.parametrize("increment", [0.25, 2.0])
 @pytest.mark.parametrize("s", [0.02, 0.18, 1.0, 10.0])
 def test_a_snake_arm_slips_off_its_circle_whatever_its_size(s, increment):
-    robot = Robot(length_mm=1000 * s, segments=40, offset_mm=40 * s, rigidity=1e6 * s * s, max_tension=200)
+    robot = Robot(
+        model="paper", length_mm=1000 * s, segments=40, offset_mm=40 * s, rigidity=1e6 * s * s, max_tension=200
+    )
     solver = Solver(robot, Scene([Circle(center=(279 * s, 890 * s), radius=78 * s)]))
     states = walk(solver, s * increment * np.arange(1, round(56 / increment) + 1))
     assert {state.status for state in states} == {Status.CONVERGED, Status.SNAPPED}
@@ -147,7 +151,7 @@ def test_a_snake_arm_slips_off_its_circle_whatever_its_size(s, increment):
 @pytest.mark.parametrize("increment", [0.02, 0.1, 0.5, 1.5, 9.5])
 def test_a_motor_stalls_before_the_peak_of_the_tension_and_not_behind_it(increment):
     """Between 9.0 and 9.5 mm the tension rises to 7.790 N and falls again to 7.715 N."""
-    robot = replace(Robot.prototype(), model="rod", max_tension=7.78, between=1)
+    robot = replace(Robot.prototype(model="paper"), model="rod", max_tension=7.78, between=1)
     braced = Circle(center=(38.489, 73.892), radius=8.132), Circle(center=(65.664, 156.712), radius=12.853)
     solver = Solver(robot, Scene(braced))
     commands = np.minimum(np.arange(1, np.ceil(9.5 / increment) + 1) * increment, 9.5)
@@ -186,7 +190,7 @@ def test_obstacles_just_above_the_least_size_are_refused_or_not_passed_through()
     taken = []
     for radius in 5 + np.array([1e-3, 2.6e-3, 2.8e-3, 3e-3, 5e-3]):
         place = {"center": (12.4, 144.3)}
-        circle = Solver(Robot.prototype(), Scene([Circle(radius=radius, **place)]))
+        circle = Solver(Robot.prototype(model="paper"), Scene([Circle(radius=radius, **place)]))
         right = circle.step(circle.rest(), 14.0)
         assert right.status is Status.STALLED
         for shape in (
@@ -194,7 +198,7 @@ def test_obstacles_just_above_the_least_size_are_refused_or_not_passed_through()
             Custom(family=disc, sizes=(radius,), reach=6, **place),
         ):
             try:
-                solver = Solver(Robot.prototype(), Scene([shape]))
+                solver = Solver(Robot.prototype(model="paper"), Scene([shape]))
             except ValueError:
                 continue
             end = solver.step(solver.rest(), 14.0)

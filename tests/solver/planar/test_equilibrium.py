@@ -18,15 +18,15 @@ from solver import (
 
 
 def test_equilibrium_of_another(circles):
-    solver = Solver(Robot.prototype(), circles((44, 104, 15)))
+    solver = Solver(Robot.prototype(model="paper"), circles((44, 104, 15)))
     with pytest.raises(ValueError, match="the equilibrium is of another robot"):
-        solver.step(Solver(Robot.prototype(segments=9), solver.scene).rest(), 1.0)
+        solver.step(Solver(Robot.prototype(model="paper", segments=9), solver.scene).rest(), 1.0)
     with pytest.raises(ValueError, match="the equilibrium is of another scene"):
         solver.step(Solver(solver.robot, circles((44, 104, 14))).rest(), 1.0)
 
 
 def test_equilibrium_is_read_only(circles):
-    equilibrium = Solver(Robot.prototype(), circles((44, 104, 15))).rest()
+    equilibrium = Solver(Robot.prototype(model="paper"), circles((44, 104, 15))).rest()
     for array in (equilibrium.block, equilibrium.nodes, equilibrium.multipliers, equilibrium.gaps):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0
@@ -36,7 +36,7 @@ def test_equilibrium_is_read_only(circles):
     "copied", [copy.copy, copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e)), replace], ids=lambda f: f.__name__
 )
 def test_a_copied_equilibrium_is_read_only(circles, copied):
-    solver = Solver(Robot.prototype(), circles((44, 104, 15)))
+    solver = Solver(Robot.prototype(model="paper"), circles((44, 104, 15)))
     equilibrium = solver.step(solver.rest(), 7.0)
     twin = copied(equilibrium)
     assert twin.status is equilibrium.status
@@ -48,7 +48,7 @@ def test_a_copied_equilibrium_is_read_only(circles, copied):
 
 
 def test_an_equilibrium_keeps_no_array_that_others_write(circles):
-    equilibrium = Solver(Robot.prototype(), circles((44, 104, 15))).rest()
+    equilibrium = Solver(Robot.prototype(model="paper"), circles((44, 104, 15))).rest()
     rows = np.array([equilibrium.block, equilibrium.block])
     kept = Equilibrium(equilibrium.robot, equilibrium.scene, rows[0], Status.CONVERGED, 0)
     rows[:] = 7.0
@@ -56,7 +56,7 @@ def test_an_equilibrium_keeps_no_array_that_others_write(circles):
 
 
 def test_an_equilibrium_is_shown_in_short(circles):
-    solver = Solver(Robot.prototype(), circles((44, 104, 15)))
+    solver = Solver(Robot.prototype(model="paper"), circles((44, 104, 15)))
     text = repr(solver.step(solver.rest(), 7.0))
     assert len(text) < 300
     assert "<Equilibrium CONVERGED: 18 segments, 180 mm long, 1 obstacles, 1 contacts, cable 7 mm" in text
@@ -87,13 +87,13 @@ def written(index, value):
     ],
 )
 def test_blocks_that_are_none(circles, change, message):
-    equilibrium = Solver(Robot.prototype(), circles((44, 104, 15))).rest()
+    equilibrium = Solver(Robot.prototype(model="paper"), circles((44, 104, 15))).rest()
     with pytest.raises(ValueError, match=message):
         Equilibrium(equilibrium.robot, equilibrium.scene, change(equilibrium.block.copy()), Status.CONVERGED, 0)
 
 
 def test_parts_of_an_equilibrium_that_are_none():
-    rest = Solver(Robot.prototype(), Scene()).rest()
+    rest = Solver(Robot.prototype(model="paper"), Scene()).rest()
     for robot, scene, status in ((None, rest.scene, rest.status), (rest.robot, [], rest.status)):
         with pytest.raises(TypeError, match=r"it must be a (Robot|Scene)"):
             Equilibrium(robot, scene, rest.block, status, 0)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver, VirtualWork, free_motion
+from solver.common.robot import MODELS
 from solver.planar.estimators import (
     LEAST_SLOPE,
     SPREAD,
@@ -20,7 +21,6 @@ from solver.planar.estimators import (
 )
 from solver.planar.forces import force_true
 from solver.planar.free import clearance, free_nodes, free_tension, tip_slopes
-from solver.planar.robot import MODELS
 
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 SCENES = [
@@ -267,6 +267,6 @@ def test_median_errors_with_unknown_rigidity_and_noise():
     ],
 )
 def test_mistakes_are_named(call, error, words):
-    state = pulled(replace(Robot.prototype(), model="rod"), SCENES[0], 6.0)
+    state = pulled(replace(Robot.prototype(model="paper"), model="rod"), SCENES[0], 6.0)
     with pytest.raises(error, match=words):
         call(state)

@@ -31,7 +31,7 @@ EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
 def pulled(scene: Scene, cable_mm: float, step: float = 0.25, model: str = "paper"):
-    solver = Solver(replace(Robot.prototype(max_tension=math.inf), model=model), scene)
+    solver = Solver(replace(Robot.prototype(model="paper", max_tension=math.inf), model=model), scene)
     now = solver.rest()
     while now.cable_mm < cable_mm - 1e-9:
         now = solver.step(now, min(now.cable_mm + step, cable_mm))
@@ -90,7 +90,7 @@ def test_tension_is_the_slope_of_the_energy_along_the_branch(model, scene):
 @EVERY_SCENE
 def test_kernel_reads_forces_slopes_and_onset(model, scene):
     """As they follow from the multipliers, the closed form of the free robot, and the way there."""
-    robot = replace(Robot.prototype(), model=model, length_range_mm=(150, 200))
+    robot = replace(Robot.prototype(model="paper"), model=model, length_range_mm=(150, 200))
     solver = Solver(robot, scene)
     now = solver.rest()
     for pulled_to, length in [(2.0, 180), (4.0, 181), (6.0, 182), (9.0, 180), (5.0, 179), (1.0, 180)]:
@@ -174,7 +174,7 @@ def test_estimate_shares_one_load_among_several_contacts():
 
 def test_table_1_theoretical_column_from_one_calibration_point():
     """Paper, Table 1: μ from d = 31 mm, 250 g → 17.8 g, then the theoretical column within its rounding."""
-    robot = Robot.prototype()
+    robot = Robot.prototype(model="paper")
     slopes = tip_slopes(robot, 3.5)
     estimator = VirtualWork.calibrated(17.8, 250.0, slopes, robot.offset_mm)
     x, y, turn = slopes

@@ -131,7 +131,7 @@ def test_shifted_obstacle(obstacle):
 
 
 def test_node_problem_at_a_solution(circles, pulls):
-    robot = Robot.prototype()
+    robot = Robot.prototype(model="paper")
     scene = circles((44, 104, 15), (70, 140, 10))
     solver, problem = Solver(robot, scene), node_problem(robot, scene.laws, scene.mounted)
     outputs = [problem.objective, problem.equalities, problem.inequalities]

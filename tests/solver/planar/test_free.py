@@ -14,7 +14,7 @@ EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
 def robot_with(model):
-    return replace(Robot.prototype(), model=model, length_range_mm=(100, 200))
+    return replace(Robot.prototype(model="paper"), model=model, length_range_mm=(100, 200))
 
 
 @EVERY_MODEL
@@ -58,4 +58,4 @@ def test_clearance_is_the_smallest_gap_of_the_free_robot(model):
 @pytest.mark.parametrize("high", [1e-320, 1e-12])
 def test_a_line_is_not_fitted_to_roundoff(high):
     with pytest.raises(ValueError, match=r"must grow within 0 to .* mm, by at least"):
-        fitted_slopes(Robot.prototype(), 0.0, high)
+        fitted_slopes(Robot.prototype(model="paper"), 0.0, high)

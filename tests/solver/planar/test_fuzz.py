@@ -33,8 +33,8 @@ from solver.spatial import SpatialBatchSolver, SpatialEquilibrium, SpatialRobot,
 from solver.spatial import forces as spatial_forces
 from solver.spatial.sensitivity import spatial_sensitivity
 
-ROBOT = Robot(length_mm=180, segments=6, offset_mm=8, between=2, length_range_mm=(150, 200))
-SPATIAL_ROBOT = SpatialRobot(length_mm=180, segments=6, offset_mm=8, between=2)
+ROBOT = Robot(model="paper", length_mm=180, segments=6, offset_mm=8, between=2, length_range_mm=(150, 200))
+SPATIAL_ROBOT = SpatialRobot(model="paper", length_mm=180, segments=6, offset_mm=8, between=2)
 SCENE = Scene([Circle(center=(50, 110), radius=18)])
 SPATIAL_SCENE = Scene([spatial.Sphere(center=(50, 0, 110), radius=18)])
 SOLVER, SPATIAL_SOLVER = Solver(ROBOT, SCENE), SpatialSolver(SPATIAL_ROBOT, SPATIAL_SCENE)

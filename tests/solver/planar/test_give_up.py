@@ -6,7 +6,7 @@ import pytest
 
 from solver import Capsule, Circle, Ellipse, Polygon, Robot, Scene, Solver, Status
 
-PAPER = replace(Robot.prototype(), model="paper", touch=("backbone", "cable"), between=0)
+PAPER = replace(Robot.prototype(model="paper"), model="paper", touch=("backbone", "cable"), between=0)
 SMALL = replace(PAPER, length_mm=12.45, offset_mm=0.8, disk_radius_mm=0.8, rigidity=50.0, max_cable_mm=2.513)
 SMALL = replace(SMALL, length_range_mm=(10.0, 18.0))
 FED_PAST_A_BLADE = (

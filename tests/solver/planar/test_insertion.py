@@ -13,7 +13,7 @@ EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
 def robot_with(model, **changes):
-    return replace(Robot.prototype(), **LENGTHS, model=model, **changes)
+    return replace(Robot.prototype(model="paper"), **LENGTHS, model=model, **changes)
 
 
 def inserted(solver, *commands):
@@ -91,12 +91,12 @@ def test_length_out_of_range_is_refused():
     for length in (59.9, 200.1, np.nan):
         with pytest.raises(ValueError, match=r"length_mm is .*; it must be from 60 to 200"):
             solver.step(solver.rest(), 1.0, length)
-    fixed = Solver(Robot.prototype(), Scene())
+    fixed = Solver(Robot.prototype(model="paper"), Scene())
     with pytest.raises(ValueError, match="it must be from 180 to 180"):
         fixed.step(fixed.rest(), 1.0, 181)
 
 
 def test_long_insertion_is_not_taken_for_blocked():
-    robot = Robot(length_mm=100, segments=18, offset_mm=8, length_range_mm=(100, 2000))
+    robot = Robot(model="paper", length_mm=100, segments=18, offset_mm=8, length_range_mm=(100, 2000))
     solver = Solver(robot, Scene())
     assert solver.step(solver.rest(), 5.0, 2000).status is Status.CONVERGED

@@ -17,7 +17,7 @@ def disc(point):
 
 
 def pulled(obstacle):
-    solver = Solver(Robot.prototype(), Scene([obstacle]))
+    solver = Solver(Robot.prototype(model="paper"), Scene([obstacle]))
     equilibrium = solver.rest()
     for cable in np.arange(0.25, 9.01, 0.25):
         equilibrium = solver.step(equilibrium, cable)
@@ -39,8 +39,8 @@ def test_a_thin_shape_that_edges_could_lie_across_is_refused():
     thin = Custom(family=ELLIPSE, sizes=(60, 2), center=(72, 60), reach=63)
     for shape in (thin, Ellipse(radii=(60, 2), center=(72, 60))):
         with pytest.raises(ValueError, match=r"has the radius 2 mm; .* give the robot between=2 or more"):
-            Solver(Robot.prototype(), Scene([shape]))
-    Solver(replace(Robot.prototype(), between=2), Scene([thin]))
+            Solver(Robot.prototype(model="paper"), Scene([shape]))
+    Solver(replace(Robot.prototype(model="paper"), between=2), Scene([thin]))
 
 
 def test_a_shape_with_a_neck_has_the_curvature_of_the_neck():
@@ -65,7 +65,7 @@ def test_functions_that_are_of_no_use_farther_away_are_refused(function, message
     shape = Custom(family=Family.trace(function), center=(44, 104), axis=(1, 2), reach=20)
     remedy = rf"{message}.* at the point .*; give a function that grows as the distance does, such as norm_2\(point\)"
     with pytest.raises(ValueError, match=remedy) as refusal:
-        Solver(Robot.prototype(), Scene([shape]))
+        Solver(Robot.prototype(model="paper"), Scene([shape]))
     x, y = map(float, re.search(r"\((\S+), (\S+)\)", str(refusal.value)).groups())
     values = shape.measure(np.array([x, y]))
     assert not np.isfinite(values).all() or (values[0] > 0) != (np.hypot(x - 44, y - 104) > 12)
@@ -78,4 +78,4 @@ def test_functions_that_overflow_only_far_from_the_robot_are_taken():
         assert np.isfinite(ours.gaps).all()
         assert ours.nodes == pytest.approx(theirs.nodes, abs=1e-6)
     with pytest.raises(ValueError, match="the gap is not positive and finite"):
-        Solver(Robot(length_mm=1800, segments=200, offset_mm=8), Scene([steep_one]))
+        Solver(Robot(model="paper", length_mm=1800, segments=200, offset_mm=8), Scene([steep_one]))

@@ -16,14 +16,14 @@ def walk(solver, cables):
 
 
 def test_rest_is_the_solvers(circles):
-    robot, scene = Robot.prototype(), circles(*SCENE)
+    robot, scene = Robot.prototype(model="paper"), circles(*SCENE)
     np.testing.assert_allclose(
         ReferenceSolver(robot, scene).rest().block, Solver(robot, scene).rest().block, atol=1e-12
     )
 
 
 def test_load_cell_touches_its_node_alone():
-    robot = Robot.prototype()
+    robot = Robot.prototype(model="paper")
     scene = Scene([HalfPlane(point=(26, 0), normal=(-1, 0), nodes=(14,))])
     reference = walk(ReferenceSolver(robot, scene), [2.0, 4.0])
     native = walk(Solver(robot, scene), [2.0, 4.0])
@@ -34,7 +34,7 @@ def test_load_cell_touches_its_node_alone():
 
 
 def test_stalls_at_the_limit(circles):
-    robot = Robot.prototype(max_tension=4.0)
+    robot = Robot.prototype(model="paper", max_tension=4.0)
     reference = ReferenceSolver(robot, circles(*SCENE))
     stalled = walk(reference, [10.0])
     again = reference.step(stalled, 11.0)
@@ -46,7 +46,7 @@ def test_stalls_at_the_limit(circles):
 
 
 def test_fails_where_the_branch_ends(circles):
-    robot = Robot.prototype(max_tension=float("inf"))
+    robot = Robot.prototype(model="paper", max_tension=float("inf"))
     scene = circles((32.4, 84.7, 14.9), (57.6, 148.6, 14.3))
     before = walk(Solver(robot, scene), np.arange(1, 50) * 0.25)
     failed = ReferenceSolver(robot, scene).step(before, 14.0)
@@ -55,7 +55,7 @@ def test_fails_where_the_branch_ends(circles):
 
 
 def test_released_robot_is_straight(circles):
-    reference = ReferenceSolver(Robot.prototype(), circles(*SCENE))
+    reference = ReferenceSolver(Robot.prototype(model="paper"), circles(*SCENE))
     released = walk(reference, [6.0, 0.0])
     assert released.status is Status.CONVERGED
     assert np.array_equal(released.block, reference.rest().block)
@@ -63,7 +63,7 @@ def test_released_robot_is_straight(circles):
 
 def test_refuses_what_the_solver_refuses(circles):
     with pytest.raises(ValueError, match="overlaps the straight robot"):
-        ReferenceSolver(Robot.prototype(), circles((10, 80, 12)))
-    reference = ReferenceSolver(Robot.prototype(), circles(*SCENE))
+        ReferenceSolver(Robot.prototype(model="paper"), circles((10, 80, 12)))
+    reference = ReferenceSolver(Robot.prototype(model="paper"), circles(*SCENE))
     with pytest.raises(ValueError, match="cable_mm is nan"):
         reference.step(reference.rest(), float("nan"))

@@ -21,7 +21,7 @@ def branch(request):
 
     recorded = SCENES[request.param]
     scene = Scene(Circle(center=(x, y), radius=r) for x, y, r in recorded["circles"])
-    solver = Solver(Robot.prototype(max_tension=math.inf), scene)
+    solver = Solver(Robot.prototype(model="paper", max_tension=math.inf), scene)
     step = 0.25 if request.param == "free" else 0.05
     wanted = {state["cable_mm"]: state for state in recorded["states"]}
     found: list[tuple[dict, Equilibrium]] = []
@@ -54,7 +54,7 @@ def test_contacts(branch):
 def test_nodes_of_figure_5(circles, pulls):
     """The multiplier peaks of Fig. 5, at nodes 11 and 17 as the paper counts."""
     scene = circles(*SCENES["two_obstacles_fig4b"]["circles"])
-    solver = Solver(Robot.prototype(max_tension=math.inf), scene)
+    solver = Solver(Robot.prototype(model="paper", max_tension=math.inf), scene)
     equilibrium = solver.rest()
     for cable in pulls(5.0, 0.05):
         equilibrium = solver.step(equilibrium, cable)

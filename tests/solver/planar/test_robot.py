@@ -27,7 +27,10 @@ PROTOTYPE = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0}
         ({"segments": 18.0}, "segments is 18.0; it must be a whole number from 2 to 4096"),
         ({"max_cable_mm": -1.0}, "max_cable_mm is -1.0; it must be positive and finite"),
         ({"max_cable_mm": 200.0}, "max_cable_mm is 200.0; it must be below 180.0"),
-        ({"max_cable_mm": 110.0, "length_range_mm": (100, 200)}, "max_cable_mm is 110.0; it must be below 100.0"),
+        (
+            {"model": "paper", "max_cable_mm": 110.0, "length_range_mm": (100, 200)},
+            "max_cable_mm is 110.0; it must be below 100.0",
+        ),
         ({"model": "slack"}, "model is 'slack'; it must be one of paper, rod"),
         ({"length_range_mm": (0, 200)}, "a bound of length_range_mm is 0; it must be positive and finite"),
         ({"length_range_mm": (190, 200)}, r"length_mm is 180.0; it must lie in length_range_mm \(190.0, 200.0\)"),
@@ -56,8 +59,10 @@ def test_robot(change, message):
 
 
 def test_numbers_of_numpy_are_numbers():
-    given = Robot(length_mm=np.float32(180), segments=np.int64(18), offset_mm=np.int32(8), between=np.uint8(2))
-    assert given == replace(Robot.prototype(), between=2)
+    given = Robot(
+        model="paper", length_mm=np.float32(180), segments=np.int64(18), offset_mm=np.int32(8), between=np.uint8(2)
+    )
+    assert given == replace(Robot.prototype(model="paper"), between=2)
     assert {type(value) for value in (given.length_mm, given.offset_mm)} == {float}
     assert {type(value) for value in (given.segments, given.between)} == {int}
     assert Circle(center=np.array([40, 100]), radius=np.int64(10)) == Circle(center=(40.0, 100.0), radius=10.0)

@@ -27,7 +27,14 @@ from solver.planar.forces import force_true
 from solver.planar.robot import LINES
 
 ROBOT = Robot(
-    length_mm=180, segments=18, offset_mm=8, touch=LINES, between=1, max_tension=100, length_range_mm=(170, 190)
+    length_mm=180,
+    segments=18,
+    offset_mm=8,
+    touch=LINES,
+    between=1,
+    max_tension=100,
+    length_range_mm=(170, 190),
+    model="paper",
 )
 LOADED = replace(
     ROBOT,

@@ -12,7 +12,7 @@ from solver import Capsule, Circle, Robot, Scene, Solver
 from solver.common.robot import MODELS
 
 SHORT = 3000
-ROBOT = Robot.prototype()
+ROBOT = Robot.prototype(model="paper")
 LINE = replace(ROBOT, touch=("backbone",))
 
 

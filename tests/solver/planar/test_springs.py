@@ -15,7 +15,7 @@ EVERY_MODEL = pytest.mark.parametrize("model", MODELS)
 
 
 def pulled(model, *obstacles, to=9.0):
-    solver = Solver(replace(Robot.prototype(), model=model), Scene(obstacles))
+    solver = Solver(replace(Robot.prototype(model="paper"), model=model), Scene(obstacles))
     equilibrium = solver.rest()
     for command in np.linspace(0, to, 37)[1:]:
         equilibrium = solver.step(equilibrium, command)
@@ -73,7 +73,7 @@ def test_obstacles_where_they_have_been_pushed_to():
 
 
 def test_let_go_the_obstacle_returns_to_its_place():
-    solver = Solver(Robot.prototype(), Scene([replace(CIRCLE, spring=0.2)]))
+    solver = Solver(Robot.prototype(model="paper"), Scene([replace(CIRCLE, spring=0.2)]))
     pushed = solver.step(solver.rest(), 8.0)
     assert pushed.displacements.any()
     assert np.array_equal(solver.step(pushed, 0.0).block, solver.rest().block)

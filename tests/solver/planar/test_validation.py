@@ -51,28 +51,28 @@ from solver.spatial import SpatialRobot, Sphere
     ],
 )
 def test_obstacle_of_a_solver(obstacle, message):
-    batch = BatchSolver(Robot.prototype(), 1, 1)
+    batch = BatchSolver(Robot.prototype(model="paper"), 1, 1)
     for solve in (Solver, ReferenceSolver, lambda _, scene: batch.assign(0, scene)):
         with pytest.raises(ValueError, match=message):
-            solve(Robot.prototype(), Scene([obstacle]))
+            solve(Robot.prototype(model="paper"), Scene([obstacle]))
     with pytest.raises(ValueError, match="robot 0 has no scene"):
         batch.scene(0)
 
 
 @pytest.mark.parametrize("solver", [Solver, ReferenceSolver])
 def test_what_a_solver_is_made_of(solver):
-    for robot in (None, 3, SpatialRobot.prototype()):
+    for robot in (None, 3, SpatialRobot.prototype(model="paper")):
         with pytest.raises(TypeError, match=r"robot is .*; it must be a Robot: robots of the plane are"):
             solver(robot, Scene())
     for scene in (None, [], Circle(center=(50, 100), radius=15)):
         with pytest.raises(TypeError, match=r"scene is .*; it must be a Scene: put the obstacles in one"):
-            solver(Robot.prototype(), scene)
+            solver(Robot.prototype(model="paper"), scene)
 
 
 @pytest.mark.parametrize("step", ["step", "trace"])
 @pytest.mark.parametrize("cable", [-0.1, 25.2, math.nan, math.inf, None, "3", True, 3j, np.array(3.0), 10**400])
 def test_command(cable, step):
-    solver = Solver(Robot.prototype(), Scene())
+    solver = Solver(Robot.prototype(model="paper"), Scene())
     pulled = solver.step(solver.rest(), 3.0)
     block = pulled.block.copy()
     with pytest.raises(ValueError, match=r"cable_mm is .*; it must be from 0 to 25.1327 \(robot.max_cable_mm\)"):
@@ -82,13 +82,13 @@ def test_command(cable, step):
 
 @pytest.mark.parametrize("length", [0, 181, math.nan, "180", True])
 def test_length(length):
-    solver = Solver(Robot.prototype(), Scene())
+    solver = Solver(Robot.prototype(model="paper"), Scene())
     with pytest.raises(ValueError, match=r"length_mm is .*; it must be from 180 to 180"):
         solver.step(solver.rest(), 1.0, length)
 
 
 def test_a_command_of_any_type_of_number_is_the_same_command():
-    solver = Solver(Robot.prototype(), Scene())
+    solver = Solver(Robot.prototype(model="paper"), Scene())
     memo = TransitionMemo(solver)
     expected = solver.step(solver.rest(), 3.0)
     for cable in (3, np.int8(3), np.float32(3), np.float64(3)):
@@ -101,7 +101,7 @@ def test_a_command_of_any_type_of_number_is_the_same_command():
 
 
 def test_what_is_no_equilibrium():
-    solver = Solver(Robot.prototype(), Scene())
+    solver = Solver(Robot.prototype(model="paper"), Scene())
     for call in (solver.step, solver.trace, TransitionMemo(solver).step):
         with pytest.raises(TypeError, match=r"equilibrium is None; it must be an Equilibrium: step from rest\(\)"):
             call(None, 1.0)
@@ -133,10 +133,10 @@ def test_what_is_no_equilibrium():
 )
 def test_functions(call, message):
     with pytest.raises(ValueError, match=message):
-        call(Robot.prototype())
+        call(Robot.prototype(model="paper"))
 
 
 def test_functions_of_a_robot():
     for call in (free.free_nodes, free.tip_slopes, free.free_tension, free.free_angle):
         with pytest.raises(TypeError, match=r"robot is SpatialRobot.*; it must be a Robot"):
-            call(SpatialRobot.prototype(), 1.0)
+            call(SpatialRobot.prototype(model="paper"), 1.0)

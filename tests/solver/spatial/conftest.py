@@ -62,7 +62,7 @@ def random_walk(generator, solver, steps):
 
 @pytest.fixture(scope="session", name="robot")
 def robot_fixture():
-    return SpatialRobot.prototype()
+    return SpatialRobot.prototype(model="paper")
 
 
 @pytest.fixture(scope="session", name="turned")

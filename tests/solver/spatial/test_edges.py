@@ -22,7 +22,7 @@ WAYS = {
 
 @pytest.mark.parametrize("way", WAYS)
 def test_a_robot_slips_off_a_sphere_by_every_way(way):
-    solver = SpatialSolver(SpatialRobot.prototype(), Scene([Sphere(center=(20, 40, 160), radius=12)]))
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper"), Scene([Sphere(center=(20, 40, 160), radius=12)]))
     state = solver.rest()
     for cables in WAYS[way]:
         state = solver.step(state, cables)
@@ -36,7 +36,7 @@ def test_a_robot_slips_off_a_sphere_by_every_way(way):
 def test_a_sharp_edge_costs_no_more_than_a_round_one(edge):
     def cost(edge):
         box = Box(center=(45, 0, 100), sizes=(20, 20, 20), edge=edge)
-        solver, times = SpatialSolver(SpatialRobot.prototype(), Scene([box])), []
+        solver, times = SpatialSolver(SpatialRobot.prototype(model="paper"), Scene([box])), []
         for _ in range(8):
             began = time.thread_time()
             solver.step(solver.rest(), (10.0, 0.0))
@@ -59,7 +59,7 @@ def test_a_sharp_edge_costs_no_more_than_a_round_one(edge):
 )
 def test_large_steps_end_where_small_ones_do(center, radius, cables):
     """Which of two neighbouring points meets a narrow obstacle does not depend on the size of the steps."""
-    solver = SpatialSolver(SpatialRobot.prototype(), Scene([Sphere(center=center, radius=radius)]))
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper"), Scene([Sphere(center=center, radius=radius)]))
     ends = []
     for steps in (400, 1, 2, 5, 12, 20, 50):
         state = solver.rest()
@@ -73,7 +73,7 @@ def test_large_steps_end_where_small_ones_do(center, radius, cables):
 def test_a_motor_never_ends_above_its_limit_where_a_release_snaps_twice():
     """What is kept of a step that ends above the limit is the last state that the motor held, not one before a snap."""
     recorded = json.loads((Path(__file__).parents[2] / "data" / "spatial_yield.json").read_text())
-    robot = SpatialRobot.prototype(between=1)
+    robot = SpatialRobot.prototype(model="paper", between=1)
     spheres = [Sphere(center=(x, y, z), radius=radius) for x, y, z, radius in recorded["spheres"]]
     solver = SpatialSolver(robot, Scene(spheres))
     state = solver.rest()

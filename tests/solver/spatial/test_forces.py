@@ -57,7 +57,7 @@ def test_tip_slopes(robot, walk):
 def test_estimate_is_that_of_the_plane(robot, walk, friction):
     in_space = Scene([HalfSpace(point=(31, 0, 127), normal=(-1, 0, 0.1), nodes=(14,))])
     in_plane = Scene([HalfPlane(point=(31, 127), normal=(-1, 0.1), nodes=(14,))])
-    solver = Solver(Robot.prototype(), in_plane)
+    solver = Solver(Robot.prototype(model="paper"), in_plane)
     planar = solver.rest()
     for pull in np.arange(0.25, 7.1, 0.25):
         planar = solver.step(planar, pull)

@@ -32,7 +32,7 @@ SCENES = {
 @pytest.mark.parametrize("angle", [math.pi / 2, 2.0])
 def test_kernel_follows_the_same_branch(name, angle):
     direction, obstacles = SCENES[name]
-    robot = SpatialRobot.prototype(angle=angle)
+    robot = SpatialRobot.prototype(model="paper", angle=angle)
     kernel, reference = SpatialSolver(robot, Scene(obstacles)), SpatialReferenceSolver(robot, Scene(obstacles))
     here, there, touched = kernel.rest(), reference.rest(), 0
     for pull in np.arange(0.5, 6.6, 0.5):
@@ -68,7 +68,9 @@ def test_an_equilibrium_of_the_reference_is_one_of_the_kernel(robot):
 @pytest.mark.parametrize("s", [0.1, 10.0])
 def test_a_robot_of_another_size_is_followed_alike(s):
     def end(s):
-        robot = SpatialRobot(length_mm=180 * s, segments=6, offset_mm=8 * s, rigidity=5e3 * s * s, between=3)
+        robot = SpatialRobot(
+            model="paper", length_mm=180 * s, segments=6, offset_mm=8 * s, rigidity=5e3 * s * s, between=3
+        )
         solver = SpatialReferenceSolver(robot, Scene([Sphere(center=(40 * s, 18 * s, 104 * s), radius=15 * s)]))
         return solver.step(solver.rest(), (5.0 * s, 2.0 * s))
 

@@ -20,7 +20,7 @@ from solver.spatial import (
     spatial_sensitivity,
 )
 
-ROBOT = SpatialRobot(length_mm=180, segments=18, offset_mm=8, angle=1.8, max_tension=100, between=1)
+ROBOT = SpatialRobot(model="paper", length_mm=180, segments=18, offset_mm=8, angle=1.8, max_tension=100, between=1)
 SPRING = ((0.4, 0.1, 0.0), (0.1, 0.2, 0.05), (0.0, 0.05, 0.3))
 PUSHED = [
     Sphere(center=(40, 18, 104), radius=15),

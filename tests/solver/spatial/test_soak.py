@@ -12,7 +12,7 @@ from solver import Scene
 from solver.spatial import Box, Capsule, Cylinder, SpatialRobot, Sphere
 
 SHORT = 2000
-ROBOT = replace(SpatialRobot.prototype(), touch=("backbone",))
+ROBOT = replace(SpatialRobot.prototype(model="paper"), touch=("backbone",))
 
 
 def test_nothing_is_found_in_random_episodes():

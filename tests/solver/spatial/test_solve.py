@@ -28,7 +28,7 @@ IN_PLANE = {
 @pytest.mark.parametrize("angle", [math.pi / 2, 2.0, -1.0])
 @pytest.mark.parametrize("cables", [(3.0, 0.0), (0.0, -2.0), (4.0, 4.0), (-5.0, 1.5)])
 def test_free_robot_is_optimal(angle, cables):
-    solver = SpatialSolver(SpatialRobot.prototype(angle=angle), Scene())
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper", angle=angle), Scene())
     equilibrium = solver.step(solver.rest(), cables)
     assert equilibrium.status is Status.CONVERGED
     assert max(equilibrium.residuals()) < 1e-12
@@ -37,8 +37,8 @@ def test_free_robot_is_optimal(angle, cables):
 @pytest.mark.parametrize("name", IN_PLANE)
 def test_one_cable_among_obstacles_of_the_plane_is_the_planar_robot(name):
     in_space, in_plane = IN_PLANE[name]
-    solver = SpatialSolver(SpatialRobot.prototype(), Scene([in_space]))
-    planar_solver = Solver(Robot.prototype(), Scene([in_plane]))
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper"), Scene([in_space]))
+    planar_solver = Solver(Robot.prototype(model="paper"), Scene([in_plane]))
     equilibrium, planar = solver.rest(), planar_solver.rest()
     for pull in np.arange(0.25, 6.01, 0.25):
         equilibrium, planar = solver.step(equilibrium, (pull, 0.0)), planar_solver.step(planar, pull)
@@ -58,7 +58,7 @@ def test_one_cable_among_obstacles_of_the_plane_is_the_planar_robot(name):
 @pytest.mark.parametrize("angle", [math.pi / 2, 2 * math.pi / 3])
 def test_equal_pulls_bend_in_the_plane_between(angle, turned):
     """Fig. 11."""
-    solver = SpatialSolver(SpatialRobot.prototype(angle=angle), Scene())
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper", angle=angle), Scene())
     nodes = turned(solver.step(solver.rest(), (4.0, 4.0)).nodes, -angle / 2)
     assert nodes[:, 1] == pytest.approx(0, abs=1e-9)
     assert nodes[-1, 0] > 40
@@ -67,9 +67,9 @@ def test_equal_pulls_bend_in_the_plane_between(angle, turned):
 def test_turning_holes_commands_and_scene_turns_the_result(turned, walk):
     """Cables at 0° and 120°, the first one pulled, are those at 0° and −120°, the second one pulled, turned by 120°."""
     third = 2 * math.pi / 3
-    one = SpatialSolver(SpatialRobot.prototype(angle=third), Scene([SPHERE]))
+    one = SpatialSolver(SpatialRobot.prototype(model="paper", angle=third), Scene([SPHERE]))
     sphere = replace(SPHERE, center=turned(SPHERE.center, -third))
-    other = SpatialSolver(SpatialRobot.prototype(angle=-third), Scene([sphere]))
+    other = SpatialSolver(SpatialRobot.prototype(model="paper", angle=-third), Scene([sphere]))
     here = walk(one, ((k / 2, 0.0) for k in range(1, 13)))
     there = walk(other, ((0.0, k / 2) for k in range(1, 13)))
     assert here.contact.any()
@@ -97,7 +97,12 @@ def test_quarter_turns_take_other_cables(quarters, robot, turned, walk):
 def test_random_walks_are_certified(seed, angle, random_solver, random_walk):
     generator = np.random.default_rng(seed)
     lines = ("backbone", "holes") if generator.random() < 0.5 else ("backbone", "rim")
-    robot = replace(SpatialRobot.prototype(angle=angle), touch=lines, rim_points=8, between=int(generator.integers(2)))
+    robot = replace(
+        SpatialRobot.prototype(model="paper", angle=angle),
+        touch=lines,
+        rim_points=8,
+        between=int(generator.integers(2)),
+    )
     for equilibrium in random_walk(generator, random_solver(generator, robot), 60)[::15]:
         assert equilibrium.status is not Status.GAVE_UP
         stationarity, lengths, gaps, complementarity, sign = equilibrium.residuals()
@@ -117,7 +122,7 @@ def test_tension_is_the_slope_of_the_energy(robot, walk):
 
 
 def test_a_cable_stops_at_the_tension_limit_and_the_other_goes_on():
-    solver = SpatialSolver(SpatialRobot.prototype(max_tension=2.0), Scene())
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper", max_tension=2.0), Scene())
     reached = solver.step(solver.rest(), (8.0, 3.0))
     assert reached.status is Status.STALLED
     assert reached.tensions[0] == pytest.approx(2.0, rel=1e-5)
@@ -131,7 +136,7 @@ def test_a_cable_stops_at_the_tension_limit_and_the_other_goes_on():
 def test_a_release_relieves_while_the_other_cable_is_pulled():
     """The second cable cannot be pulled on without the first one passing its limit: it is let out first."""
     wall = HalfSpace(point=(18, 0, 0), normal=(-1, 0, 0))
-    solver = SpatialSolver(SpatialRobot.prototype(max_tension=1.5), Scene([wall]))
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper", max_tension=1.5), Scene([wall]))
     equilibrium = solver.rest()
     for _ in range(20):
         equilibrium = solver.step(equilibrium, np.minimum(equilibrium.cables_mm + 0.5, 12.0))
@@ -225,13 +230,19 @@ def test_a_pull_towards_a_sphere_reaches_a_force(robot):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: SpatialRobot.prototype(angle=math.pi), "angle is"),
-        (lambda: SpatialRobot(length_mm=180, segments=1, offset_mm=8), "segments is 1"),
-        (lambda: SpatialRobot(length_mm=180, segments=18, offset_mm=8, max_cable_mm=300), "max_cable_mm is 300"),
-        (lambda: SpatialRobot(length_mm=180, segments=18, offset_mm=8, max_tension=0), "max_tension is 0"),
-        (lambda: SpatialRobot(length_mm=180, segments=18, offset_mm=8, touch=("cable",)), "touch is"),
-        (lambda: SpatialRobot(length_mm=180, segments=18, offset_mm=8, rim_points=2), "rim_points is 2"),
-        (lambda: SpatialRobot(length_mm=180, segments=18, offset_mm=8, between=-1), "between is -1"),
+        (lambda: SpatialRobot.prototype(model="paper", angle=math.pi), "angle is"),
+        (lambda: SpatialRobot(model="paper", length_mm=180, segments=1, offset_mm=8), "segments is 1"),
+        (
+            lambda: SpatialRobot(model="paper", length_mm=180, segments=18, offset_mm=8, max_cable_mm=300),
+            "max_cable_mm is 300",
+        ),
+        (
+            lambda: SpatialRobot(model="paper", length_mm=180, segments=18, offset_mm=8, max_tension=0),
+            "max_tension is 0",
+        ),
+        (lambda: SpatialRobot(model="paper", length_mm=180, segments=18, offset_mm=8, touch=("cable",)), "touch is"),
+        (lambda: SpatialRobot(model="paper", length_mm=180, segments=18, offset_mm=8, rim_points=2), "rim_points is 2"),
+        (lambda: SpatialRobot(model="paper", length_mm=180, segments=18, offset_mm=8, between=-1), "between is -1"),
         (lambda: Sphere(center=(1, 2, math.inf), radius=3), "center is"),
         (lambda: Sphere(center=(1, 2), radius=3), "three coordinates"),
         (lambda: Sphere(center=(1, 2, 3), radius=3, spring=((1, 0), (0, 1))), "of three rows"),
@@ -240,14 +251,19 @@ def test_a_pull_towards_a_sphere_reaches_a_force(robot):
         (lambda: Cylinder(start=(1, 2, 3), end=(1, 2, 3), radius=3), "start and end"),
         (lambda: Box(center=(1, 2, 3), sizes=(5, 5, 1), edge=1), "edge is 1"),
         (lambda: Box(center=(1, 2, 3), sizes=(5, 5, 5), second=(2, 0, 0)), "second is"),
-        (lambda: SpatialSolver(SpatialRobot.prototype(), Scene([Circle(center=(40, 90), radius=9)])), "of the plane"),
+        (
+            lambda: SpatialSolver(SpatialRobot.prototype(model="paper"), Scene([Circle(center=(40, 90), radius=9)])),
+            "of the plane",
+        ),
         (lambda: Scene([Circle(center=(40, 90), radius=9), SPHERE]), "some of the plane"),
         (
-            lambda: SpatialSolver(SpatialRobot.prototype(), Scene([Sphere(center=(10, 0, 90), radius=12)])),
+            lambda: SpatialSolver(
+                SpatialRobot.prototype(model="paper"), Scene([Sphere(center=(10, 0, 90), radius=12)])
+            ),
             "overlaps the straight robot",
         ),
         (
-            lambda: SpatialSolver(SpatialRobot.prototype(), Scene([Sphere(center=(40, 0, 90), radius=3)])),
+            lambda: SpatialSolver(SpatialRobot.prototype(model="paper"), Scene([Sphere(center=(40, 0, 90), radius=3)])),
             "could slip between points",
         ),
     ],

@@ -44,7 +44,10 @@ def pulled(robot):
         ({"touch": "rim"}, r"touch is 'rim'; it must be a tuple of some of .*, as \('backbone',\)"),
         ({"rim_points": 16.0}, "rim_points is 16.0; it must be a whole number from 3 to 64"),
         ({"offset_mm": 1e-3}, "offset_mm is 0.001; it must be from 0.018 to 1800"),
-        ({"segments": 4096, "between": 16}, "348165 points that can touch, and at most 262144 are allowed"),
+        (
+            {"model": "paper", "segments": 4096, "between": 16},
+            "348165 points that can touch, and at most 262144 are allowed",
+        ),
     ],
 )
 def test_robot(change, message):
@@ -54,7 +57,7 @@ def test_robot(change, message):
 
 @pytest.mark.parametrize("angle", [math.pi / 6, math.pi / 2, 5 * math.pi / 6, -math.pi / 3])
 def test_angles_that_are_taken(angle):
-    assert SpatialRobot.prototype(angle=angle).angle == angle
+    assert SpatialRobot.prototype(model="paper", angle=angle).angle == angle
 
 
 @pytest.mark.parametrize(
@@ -86,7 +89,7 @@ def test_obstacle_of_a_solver(robot, obstacle, message):
 
 @pytest.mark.parametrize("solver", [SpatialSolver, SpatialReferenceSolver, lambda r, s: SpatialBatchSolver(r, 1, 0)])
 def test_what_a_solver_is_made_of(solver):
-    for robot in (None, Robot.prototype()):
+    for robot in (None, Robot.prototype(model="paper")):
         with pytest.raises(TypeError, match=r"robot is .*; it must be a SpatialRobot: robots of the plane are"):
             solver(robot, Scene())
 
