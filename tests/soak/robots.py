@@ -92,8 +92,6 @@ def _opposing(generator, end=None):
     offsets = (None, None) if generator.random() < 0.5 else generator.uniform(2, 8, 2).tolist()
     sides = zip((0, math.pi), offsets, strict=True)
     return tuple(Cable(angle=angle, offset_mm=offset, end=end) for angle, offset in sides)
-        Cable(angle=angle, offset_mm=offset, end=end) for angle, offset in zip((0, math.pi), offsets, strict=True)
-    )
 
 
 def _around(generator):
