@@ -12,7 +12,7 @@ LEAST_TENSION = 1e-6  # a limit of tension, over EI/(aL): the robot cannot bend 
 LEAST_CABLE = 1e-6  # the largest cable displacement, over a
 MODELS = ("paper", "rod")
 THICKEST = 0.9  # thickness of a disk, over the segment at its shortest
-ANGLES = 64  # samples in the search for the longest edge of a bent segment
+THIRDS = 80  # of the range of angles in the search for the longest edge of a bent segment
 MAX_POINTS = 2**18  # that can touch, on all lines together
 
 
@@ -202,5 +202,13 @@ def longest_arc_edge(segment: float, line: float, widest: float) -> float:
         line: Distance of the line from the backbone [mm].
         widest: Largest angle of the arc [rad].
     """
-    angles = (widest * k / ANGLES for k in range(1, ANGLES + 1))
-    return max(2 * (segment / t + abs(line)) * math.sin(t / 2) for t in angles)
+    low, high = 0.0, widest
+    for _ in range(THIRDS):  # concave, so the larger of two values tells where the largest is not
+        left, right = low + (high - low) / 3, high - (high - low) / 3
+        shorter = _arc_edge(segment, line, left) < _arc_edge(segment, line, right)
+        low, high = (left, high) if shorter else (low, right)
+    return max(_arc_edge(segment, line, angle) for angle in (high, widest))
+
+
+def _arc_edge(segment: float, line: float, angle: float) -> float:
+    return 2 * (segment / angle + abs(line)) * math.sin(angle / 2)

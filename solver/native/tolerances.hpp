@@ -11,6 +11,7 @@ namespace ccr::tolerances {
 // for the rod the largest slope of the objective takes the place of the squared angle.
 inline constexpr double kStationarity = 1e-9;
 inline constexpr double kRoundoff = 1e-13;
+inline constexpr double kUnbent = 1e-6;  // least slope of the objective that counts: of a rod that is all but straight
 inline constexpr double kFeasibility = 5e-13;  // [L]
 inline constexpr double kWidestTurn = 3.1;     // largest angle between consecutive disks in the range of the laws
 inline constexpr double kDisksClose =

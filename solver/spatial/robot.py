@@ -244,7 +244,8 @@ class SpatialRobot:
         if self.model == "rod":
             reaches = np.linalg.norm(self.lines_mm, axis=1)
             widest = widest_bend(self.segment_mm, self.edge_mm, self.disk_thickness_mm)
-            return tuple(longest_arc_edge(self.segment_mm, reach, widest) / (self.between + 1) for reach in reaches)
+            longest = [longest_arc_edge(self.segment_mm, reach, widest) for reach in reaches]
+            return tuple(max(self.segment_mm, length) / (self.between + 1) for length in longest)
         segment, shared = self.segment_mm, self.cable_limit_mm / self.segments
         turned = math.sqrt(segment**2 - (segment - shared) ** 2)
         stretched = np.abs(self.line_weights).sum(axis=1) * turned

@@ -110,7 +110,7 @@ def _around(generator):
 
 def _limit(generator):
     """Return a tension limit: mostly that of the prototype, sometimes a high one or none [N]."""
-    return float(generator.choice([15.0, 100.0, math.inf], p=[0.85, 0.1, 0.05]))
+    return float(generator.choice([15.0, 100.0, math.inf], p=[0.88, 0.1, 0.02]))
 
 
 def _unlike(generator, robot):

@@ -42,7 +42,8 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   if (left_branch(command, moved, loss)) return Move::kRejected;
   const double tension = highest(trial_tensions_), limit = problem_.robot().max_tension;
   const bool pulled = pulls_cable(command) && command.length == present_.command.length;
-  const bool rising = pulled || (!only_releases(command) && tension > highest(tensions_));
+  const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
+  const bool rising = pulled || (!loading && !only_releases(command) && tension > highest(tensions_));
   if (rising && tension > limit) return Move::kOverTension;
   // The tension may exceed the limit in between and fall again. Work of the cables beyond that of a linear tension
   // bounds the mean excess over the straight line; the peak is at most twice the mean.

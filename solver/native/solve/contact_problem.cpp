@@ -186,7 +186,8 @@ double ContactProblem<Model>::violation() const {
 
 template <class Model>
 double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) const {
-  const double scale = Model::kRod ? model_.max_objective_slope + load_slope_ : model_.free_turn() * model_.free_turn();
+  const double scale = Model::kRod ? std::max(model_.max_objective_slope + load_slope_, tolerances::kUnbent)
+                                   : model_.free_turn() * model_.free_turn();
   double pressed = Model::kRod ? scale : model_.max_objective_slope;  // largest slope, of the objective or of a contact
   for (int j = 0; j < active.count; ++j)
     pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));

@@ -23,3 +23,14 @@ def test_cables_all_around_stall_at_the_tension_limit(count):
     free = solver.step(again, bent.cables_mm)
     assert free.status is Status.CONVERGED
     assert free.nodes == pytest.approx(bent.nodes, abs=1e-7)
+
+
+def test_cables_go_slack_on_a_robot_that_is_straight_then():
+    cables = tuple(Cable(angle=math.pi / 2 * k) for k in range(4))
+    solver = SpatialSolver(SpatialRobot.prototype(model="rod", cables=cables), Scene())
+    state = solver.rest()
+    for pull in (0.094, 0.012, -0.07):
+        state = solver.step(state, (pull, -1.3, -4.0, -2.0))
+        assert state.status is Status.CONVERGED
+    assert not state.tensions.any()
+    assert state.nodes == pytest.approx(solver.rest().nodes, abs=1e-12)
