@@ -42,7 +42,12 @@ class Finding(NamedTuple):
 def check(solver, taken, tally, offset=0):
     """Return all findings of a walk, and add its measurements to the tally."""
     findings = _rest(solver, taken) + _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
-    findings += _stalled(solver, taken) + _gave_up(solver, taken, tally) + _blocked(solver, taken, tally) + _cores(solver, taken, tally)
+    findings += (
+        _stalled(solver, taken)
+        + _gave_up(solver, taken, tally)
+        + _blocked(solver, taken, tally)
+        + _cores(solver, taken, tally)
+    )
     tally.findings.update(finding.kind for finding in findings)
     return findings
 

@@ -1,8 +1,7 @@
 // The continuation compiled for one model. Its files: block_io (blocks read and written), model_continuation (a branch
-// followed), rest (where it begins), acceptance (whether a shape continues the branch), passage (whether the robot
-// passed through an obstacle), tension_limit (stalls and yielding motors), conflict (cables that pull against each
-// other), descent (what happens after the end of a
-// branch), ramp (whether a pull reaches a force).
+// followed), trend (how it goes on), rest (where it begins), acceptance (whether a shape continues the branch), passage
+// (whether the robot passed through an obstacle), tension_limit (stalls and yielding motors), conflict (cables that
+// pull against each other), descent (what happens after the end of a branch), ramp (whether a pull reaches a force).
 #pragma once
 
 #include <array>
