@@ -26,7 +26,7 @@ REPEATS = 300  # of a command that was given up on, each of which must come near
 PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
 STALLED_AGAIN = 3  # stalled steps of an episode that are repeated
 MOVED_ON = 1e-4  # of the offset: a repeated command that stalled must not lead farther
-UNLIMITED = 30  # tension over EI/aL of cables that pull against each other where no motor sets a limit
+BUCKLING = 0.9  # of the tension 6 EI/l0² at which cables that pull against each other bend segments against each other
 UNPULLED = 10  # contact force over the tension: beyond what the cables can cause
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
 
@@ -42,7 +42,12 @@ class Finding(NamedTuple):
 def check(solver, taken, tally, offset=0):
     """Return all findings of a walk, and add its measurements to the tally."""
     findings = _rest(solver, taken) + _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
-    findings += _stalled(solver, taken) + _gave_up(solver, taken, tally) + _blocked(solver, taken, tally) + _cores(solver, taken, tally)
+    findings += (
+        _stalled(solver, taken)
+        + _gave_up(solver, taken, tally)
+        + _blocked(solver, taken, tally)
+        + _cores(solver, taken, tally)
+    )
     tally.findings.update(finding.kind for finding in findings)
     return findings
 
@@ -109,7 +114,7 @@ def _optimality(solver, taken, tally, offset):
     """Check the kernel's residuals of every state, and the node-coordinate certificate of events and some others."""
     findings, certified = [], 0
     for k, (before, state) in enumerate(pairwise(taken.states)):
-        worst = float(np.max(solver.optimality(state)))
+        worst = float(np.max(solver.optimality(state))) / _strain(state)
         tally.worst_optimality = max(tally.worst_optimality, worst)
         if not worst <= OPTIMAL:
             findings.append(Finding("optimality", k, worst))
@@ -126,8 +131,15 @@ def _optimality(solver, taken, tally, offset):
     return findings
 
 
+def _strain(state):
+    """Return by how much tensions that no motor limits exceed those that bend the robot, at least 1."""
+    robot = state.robot
+    unit = robot.rigidity / (robot.offset_mm * robot.longest_mm)
+    return max(1.0, float(np.max(state.tensions)) / unit) if np.isinf(robot.max_tension) else 1.0
+
+
 def has_certificate(robot):
-    """Return whether there is a node-coordinate problem of the robot: not yet of rods in space or with more than one cable."""
+    """Return whether a node-coordinate certificate is at hand: not yet for rods in space or with several cables."""
     return robot.model == "paper" or (isinstance(robot, Robot) and robot.bends_evenly)
 
 
@@ -173,8 +185,8 @@ def _reason(solver, taken, k):
     one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
     more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
     draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
-    limit to that. ``unlimited``: without a tension limit, cables that pull against each other buckle the robot from
-    segment to segment.
+    limit to that. ``unlimited``: no tension limit short of 6 EI/l0² keeps cables that pull against each other from
+    buckling the robot segment by segment.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = _trace(solver, taken.states[k], command).reason
@@ -187,9 +199,8 @@ def _reason(solver, taken, k):
             return "slack"
     elif robot.model == "paper" and np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"
-    if np.isinf(robot.max_tension) and np.max(state.tensions) > UNLIMITED * robot.rigidity / (
-        robot.offset_mm * robot.longest_mm
-    ):
+    buckling = 6 * robot.rigidity * (robot.segments / state.length_mm) ** 2
+    if len(robot.cables) > 1 and robot.model == "rod" and robot.max_tension > BUCKLING * buckling:
         return "unlimited"
     state = _repeated(solver, state, command)
     if state.status != Status.GAVE_UP:

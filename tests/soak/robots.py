@@ -90,7 +90,9 @@ def _ending(cable, end):
 def _opposing(generator, end=None):
     """Return two cables on opposite sides, half of them at the same distance from the backbone."""
     offsets = (None, None) if generator.random() < 0.5 else generator.uniform(2, 8, 2).tolist()
-    return tuple(Cable(angle=angle, offset_mm=offset, end=end) for angle, offset in zip((0, math.pi), offsets))
+    return tuple(
+        Cable(angle=angle, offset_mm=offset, end=end) for angle, offset in zip((0, math.pi), offsets, strict=True)
+    )
 
 
 def _around(generator):
@@ -104,7 +106,7 @@ def _around(generator):
         case _:
             angles = generator.uniform(0, 2 * math.pi, count)
     offsets = count * [None] if generator.random() < 0.6 else generator.uniform(2, 8, count).tolist()
-    return tuple(Cable(angle=angle, offset_mm=offset) for angle, offset in zip(angles.tolist(), offsets))
+    return tuple(Cable(angle=angle, offset_mm=offset) for angle, offset in zip(angles.tolist(), offsets, strict=True))
 
 
 def _limit(generator):
@@ -132,7 +134,9 @@ def _loaded(generator, robot, space):
         force = BENDING * 10 ** generator.uniform(-1, 0.7) * _unit(generator, space)
         moment = float(180 * BENDING * generator.normal()) if space == 2 and generator.random() < 0.3 else 0.0
         at = (8.0, float(generator.choice([0.0, math.pi])))
-        loads.append(Load(node=int(generator.integers(1, robot.segments + 1)), force=tuple(force), moment=moment, at=at))
+        loads.append(
+            Load(node=int(generator.integers(1, robot.segments + 1)), force=tuple(force), moment=moment, at=at)
+        )
     return replace(robot, loads=tuple(loads))
 
 

@@ -48,9 +48,7 @@ def _of_rod(robot, s):
         "cables": [replace(cable, offset_mm=cable.offset_mm and s * cable.offset_mm) for cable in robot.cables],
         "segment_rigidity": times(robot.segment_rigidity, s * s),
         "weight_per_length": times(robot.weight_per_length, 1 / s),
-        "loads": [
-            replace(load, moment=s * load.moment, at=(s * load.at[0], load.at[1])) for load in robot.loads
-        ],
+        "loads": [replace(load, moment=s * load.moment, at=(s * load.at[0], load.at[1])) for load in robot.loads],
     }
 
 

@@ -90,7 +90,7 @@ def _direction(generator, solver, drive):
     planar = isinstance(solver.robot, Robot)
     if planar and drive.inputs == 1 and solver.robot.least_cable_mm == 0:
         return np.ones(1)
-    if planar or drive.matrix is None and solver.robot.model == "rod":
+    if planar or (drive.matrix is None and solver.robot.model == "rod"):
         towards = generator.normal(size=drive.inputs)
         if generator.random() < 0.3:
             towards = np.abs(towards)

@@ -170,9 +170,29 @@ void ModelContinuation<Model>::write_mounts(const std::vector<Position>& mounts,
     displacements = write(problem_.mount_of(j) < 0 ? Position{}.v : mounts[problem_.mount_of(j)].v, displacements);
 }
 
+template <class Model>
+Optimality ModelContinuation<Model>::optimality(const double* block) {
+  read_block(block);
+  evaluate_present();
+  Optimality found;
+  const double length = problem_.robot().max_length;
+  for (const auto& g : problem_.gradient())
+    for (const double slope : g.v) found.stationarity = std::max(found.stationarity, std::abs(slope));
+  for (const auto& g : problem_.mount_gradient())
+    found.stationarity = std::max(found.stationarity, length / problem_.robot().segments * norm(g));
+  found.gap = problem_.violation() / length;
+  for (int j = 0; j < present_.active.count; ++j) {
+    const double gap = std::abs(problem_.gaps()[present_.active.contact[j]]);
+    found.gap = std::max(found.gap, gap / length);
+    found.complementarity = std::max(found.complementarity, gap * present_.active.multiplier[j]);
+  }
+  return found;
+}
+
 #define CCR_INSTANTIATE(Model)                                       \
   template void ModelContinuation<Model>::read_block(const double*); \
-  template void ModelContinuation<Model>::write_block(double*);
+  template void ModelContinuation<Model>::write_block(double*);      \
+  template Optimality ModelContinuation<Model>::optimality(const double*);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

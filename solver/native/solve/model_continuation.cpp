@@ -318,25 +318,6 @@ StepResult ModelContinuation<Model>::trace(const double* from, const double* tar
   return result;
 }
 
-template <class Model>
-Optimality ModelContinuation<Model>::optimality(const double* block) {
-  read_block(block);
-  evaluate_present();
-  Optimality found;
-  const double length = problem_.robot().max_length;
-  for (const auto& g : problem_.gradient())
-    for (const double slope : g.v) found.stationarity = std::max(found.stationarity, std::abs(slope));
-  for (const auto& g : problem_.mount_gradient())
-    found.stationarity = std::max(found.stationarity, length / problem_.robot().segments * norm(g));
-  found.gap = problem_.violation() / length;
-  for (int j = 0; j < present_.active.count; ++j) {
-    const double gap = std::abs(problem_.gaps()[present_.active.contact[j]]);
-    found.gap = std::max(found.gap, gap / length);
-    found.complementarity = std::max(found.complementarity, gap * present_.active.multiplier[j]);
-  }
-  return found;
-}
-
 #define CCR_INSTANTIATE(Model)                                                                 \
   template ModelContinuation<Model>::ModelContinuation(const Robot&, int);                     \
   template Status ModelContinuation<Model>::pursue(const Command&);                            \
