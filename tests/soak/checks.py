@@ -26,7 +26,7 @@ REPEATS = 300  # of a command that was given up on, each of which must come near
 PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
 STALLED_AGAIN = 3  # stalled steps of an episode that are repeated
 MOVED_ON = 1e-4  # of the offset: a repeated command that stalled must not lead farther
-UNLIMITED = 30  # tension over EI/aL of cables that pull against each other where no motor sets a limit
+BUCKLING = 0.9  # of the tension 6 EI/l0² at which cables that pull against each other bend segments against each other
 UNPULLED = 10  # contact force over the tension: beyond what the cables can cause
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
 
@@ -114,7 +114,7 @@ def _optimality(solver, taken, tally, offset):
     """Check the kernel's residuals of every state, and the node-coordinate certificate of events and some others."""
     findings, certified = [], 0
     for k, (before, state) in enumerate(pairwise(taken.states)):
-        worst = float(np.max(solver.optimality(state)))
+        worst = float(np.max(solver.optimality(state))) / _strain(state)
         tally.worst_optimality = max(tally.worst_optimality, worst)
         if not worst <= OPTIMAL:
             findings.append(Finding("optimality", k, worst))
@@ -129,6 +129,13 @@ def _optimality(solver, taken, tally, offset):
             if not worst <= CERTIFIED:
                 findings.append(Finding("certificate", k, worst))
     return findings
+
+
+def _strain(state):
+    """Return by how much tensions that no motor limits exceed those that bend the robot, at least 1."""
+    robot = state.robot
+    unit = robot.rigidity / (robot.offset_mm * robot.longest_mm)
+    return max(1.0, float(np.max(state.tensions)) / unit) if np.isinf(robot.max_tension) else 1.0
 
 
 def certificate(state):
@@ -173,8 +180,8 @@ def _reason(solver, taken, k):
     one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
     more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
     draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
-    limit to that. ``unlimited``: without a tension limit, cables that pull against each other buckle the robot from
-    segment to segment.
+    limit to that. ``unlimited``: no tension limit short of 6 EI/l0² keeps cables that pull against each other from
+    buckling the robot segment by segment.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = _trace(solver, taken.states[k], command).reason
@@ -187,9 +194,8 @@ def _reason(solver, taken, k):
             return "slack"
     elif robot.model == "paper" and np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"
-    if np.isinf(robot.max_tension) and np.max(state.tensions) > UNLIMITED * robot.rigidity / (
-        robot.offset_mm * robot.longest_mm
-    ):
+    buckling = 6 * robot.rigidity * (robot.segments / state.length_mm) ** 2
+    if len(robot.cables) > 1 and robot.model == "rod" and robot.max_tension > BUCKLING * buckling:
         return "unlimited"
     state = _repeated(solver, state, command)
     if state.status != Status.GAVE_UP:

@@ -75,11 +75,8 @@ def _clear(generator, robot, sample, count, margin=None):
 def rest_points(robot):
     """Return the points of the robot without loads, ``(p * positions, d)``."""
     if np.any(robot.precurvature):
-        points = (
-            make_solver(replace(robot, loads=(), weight_per_length=len(robot.weight_per_length) * (0.0,)), Scene())
-            .rest()
-            .points
-        )
+        unloaded = replace(robot, loads=(), weight_per_length=len(robot.weight_per_length) * (0.0,))
+        points = make_solver(unloaded, Scene()).rest().points
         return points.reshape(-1, points.shape[-1])
     along = np.linspace(0, robot.length_mm, robot.segments + 1)
     nodes, frames = np.zeros((1, len(along), 3)), np.broadcast_to(np.eye(3), (1, len(along), 3, 3))

@@ -276,15 +276,6 @@ bool ActiveSetQp<Model>::find_softest(const ContactProblem& problem, KktSystem& 
   return true;
 }
 
-namespace {
-
-bool is_pushing(const ActiveSet& active) {
-  const auto end = active.multiplier.begin() + active.count;
-  return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
-}
-
-}  // namespace
-
 template <class Model>
 bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
   const Load load{nullptr, &step};
@@ -292,7 +283,8 @@ bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, 
   add_penalty_response(problem, active, step);
   if (factor_gram(active) != Gram::kSound) return false;
   apply(closing_multipliers(problem, active, step), active, step);
-  return is_pushing(active);
+  const auto end = active.multiplier.begin() + active.count;
+  return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
 }
 
 template <class Model>
@@ -309,7 +301,8 @@ bool ActiveSetQp<Model>::balance(const ContactProblem& problem, KktSystem& kkt, 
   for (int j = 0; j < active.count; ++j) change[j] = -along(j, step);
   solve_gram(active.count, change);
   apply(change, active, step);
-  return is_pushing(active);
+  for (int j = 0; j < active.count; ++j) active.multiplier[j] = std::max(0.0, active.multiplier[j]);
+  return true;
 }
 
 #define CCR_INSTANTIATE(Model) template class ActiveSetQp<Model>;
