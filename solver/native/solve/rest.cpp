@@ -48,8 +48,12 @@ bool ModelContinuation<Model>::bend_freely() {
   for (int k = 0; k < cables; ++k) one.command.cables[k] = trial_.command.cables[k] / n;
   one.command.length = trial_.command.length / n;
   one.controls[0] = trial_.controls[0];
-  one.active = trial_.active;
-  for (int j = 0; j < one.active.count; ++j) one.active.contact[j] -= problem_.contacts();
+  one.active.count = 0;  // the last trial may have touched an obstacle
+  for (int j = 0; j < trial_.active.count; ++j) {
+    if (trial_.active.contact[j] < problem_.contacts()) continue;
+    one.active.contact[one.active.count] = trial_.active.contact[j] - problem_.contacts();
+    one.active.multiplier[one.active.count++] = trial_.active.multiplier[j];
+  }
   if (!segment_.solve(one, 0).converged || !segment_.is_definite(one.active)) return false;
   std::fill(trial_.controls.begin(), trial_.controls.end(), one.controls[0]);
   std::fill(trial_.mounts.begin(), trial_.mounts.end(), Position{});
