@@ -37,8 +37,9 @@ NUMBERS = 11  # of Shared
 def shared_values(control: ca.SX, length: ca.SX) -> Shared:
     """Return c, g, p and q of a segment, with their slopes.
 
-    With h = t/4 and s = h², all follow from ``q(h)`` without cancellation: ``S = sinc h = 1 − s q(h)``, ``C = cos h =
-    S + 2 s dS/ds``, g = S C, p = S²/8 and ``q = (q(h) + S K)/16 + g p``, where ``K = (1 − C)/s = 3 q(h) + 2 s dq(h)/ds``.
+    With h = t/4 and s = h², all follow from ``q(h)`` without cancellation: ``S = sinc h = 1 − s q(h)``,
+    ``C = cos h = S + 2 s dS/ds``, g = S C, p = S²/8 and ``q = (q(h) + S K)/16 + g p``, where
+    ``K = (1 − C)/s = 3 q(h) + 2 s dq(h)/ds``.
     """
     chord = _spread(*_quarter(ca.sumsqr(control[:2]) / 16)[1:])
     quarter = ca.sumsqr(control) / 16
