@@ -24,8 +24,10 @@ inline constexpr double kRelaxed = 1e-12;      // last relative change of the fr
 
 // Newton.
 inline constexpr int kNewtonIterations = 10;
-inline constexpr double kNewtonCap = 0.3;     // largest step of one iteration
-inline constexpr double kNewtonClose = 1e-4;  // after a step this small the factorisation serves once more
+inline constexpr double kNewtonCap = 0.3;        // largest step of one iteration
+inline constexpr double kNewtonClose = 1e-4;     // after a step this small the factorisation serves once more
+inline constexpr double kReuseClose = 1e-2;      // the same where it serves as long as each further step is at most
+inline constexpr double kCorrectionRate = 0.05;  // this fraction of the last
 inline constexpr double kArmijo = 1e-4;
 inline constexpr int kBacktracks = 6;
 inline constexpr int kDampedIterations = 2;  // at the start of a small sub-step, where H is not positive definite

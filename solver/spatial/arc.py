@@ -19,9 +19,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from solver.common.gap_laws import sinc_and_slopes
-
-SERIES_TERMS = 14  # of the power series of q for t up to π
+SERIES_TERMS = 9  # of the power series of q(t/4), to the last digit for t up to π
 
 
 class Shared(NamedTuple):
@@ -37,21 +35,42 @@ NUMBERS = 11  # of Shared
 
 
 def shared_values(control: ca.SX, length: ca.SX) -> Shared:
-    """Return c, g, p and q of a segment, with their slopes."""
-    chord = sinc_and_slopes(ca.sumsqr(control[:2]) / 4)
-    square = ca.sumsqr(control)
-    spread = sinc_and_slopes(square / 4)
-    quarter, first, second = sinc_and_slopes(square / 16)  # p is the square of this sinc, over 8
-    turn = slope = ca.SX(0)
-    for k in reversed(range(SERIES_TERMS)):
-        slope = turn + square * slope
-        turn = (-1) ** k / math.factorial(2 * k + 3) + square * turn
+    """Return c, g, p and q of a segment, with their slopes.
+
+    With h = t/4 and s = h², all follow from ``q(h)`` without cancellation: ``S = sinc h = 1 − s q(h)``,
+    ``C = cos h = S + 2 s dS/ds``, g = S C, p = S²/8 and ``q = (q(h) + S K)/16 + g p``, where
+    ``K = (1 − C)/s = 3 q(h) + 2 s dq(h)/ds``.
+    """
+    chord = _spread(*_quarter(ca.sumsqr(control[:2]) / 16)[1:])
+    quarter = ca.sumsqr(control) / 16
+    (turn, turn1, turn2), sinc, cosine = _quarter(quarter)
+    spread, lean = _spread(sinc, cosine), (sinc[0] ** 2 / 8, sinc[0] * sinc[1] / 64)
+    fall, fall1 = 3 * turn + 2 * quarter * turn1, 5 * turn1 + 2 * quarter * turn2
+    half1 = turn1 + sinc[1] * fall + sinc[0] * fall1
     return Shared(
-        (length * chord[0], length * chord[1] / 4, length * chord[2] / 16),
-        (spread[0], spread[1] / 4, spread[2] / 16),
-        (quarter**2 / 8, quarter * first / 64, (first**2 + quarter * second) / 1024),
-        (turn, slope),
+        (length * chord[0], length * chord[1], length * chord[2]),
+        spread,
+        (*lean, (sinc[1] ** 2 + sinc[0] * sinc[2]) / 1024),
+        ((turn + sinc[0] * fall) / 16 + spread[0] * lean[0], half1 / 256 + spread[1] * lean[0] + spread[0] * lean[1]),
     )
+
+
+def _quarter(square: ca.SX) -> tuple[tuple[ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX, ca.SX], ca.SX]:
+    """Return q and sinc of h with two slopes each in ``square = h²``, and cos h."""
+    value = slope = half_curvature = ca.SX(0)
+    for k in reversed(range(SERIES_TERMS)):
+        half_curvature = slope + square * half_curvature
+        slope = value + square * slope
+        value = (-1) ** k / math.factorial(2 * k + 3) + square * value
+    sinc, sinc1 = 1 - square * value, -value - square * slope
+    sinc2 = -2 * slope - 2 * square * half_curvature
+    return (value, slope, 2 * half_curvature), (sinc, sinc1, sinc2), sinc + 2 * square * sinc1
+
+
+def _spread(sinc: tuple[ca.SX, ca.SX, ca.SX], cosine: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return sinc(2h) with its slopes in 16 h², from sinc and cosine of h."""
+    value, slope, curvature = sinc
+    return value * cosine, (slope * cosine - value**2 / 2) / 16, (curvature * cosine - 1.5 * value * slope) / 256
 
 
 def _symbols() -> tuple[ca.SX, Shared]:

@@ -19,7 +19,8 @@ template <int N, class Transition>
 Mat<N, N> dense(const Transition& a) {
   Mat<N, N> identity;
   for (int k = 0; k < N; ++k) identity(k, k) = 1;
-  return times(identity, a);
+  multiply(identity, a);
+  return identity;
 }
 
 template <int N>

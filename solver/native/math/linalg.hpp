@@ -4,17 +4,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
+
+#include "math/pack.hpp"
 
 namespace ccr {
 
-template <int R, int C>
+template <int R, int C, class T = double>
 struct Mat {
-  std::array<double, R * C> v{};
-  double& operator()(int r, int c) { return v[r * C + c]; }
-  double operator()(int r, int c) const { return v[r * C + c]; }
-  double& operator[](int i) { return v[i]; }
-  double operator[](int i) const { return v[i]; }
+  std::array<T, R * C> v{};
+  T& operator()(int r, int c) { return v[r * C + c]; }
+  const T& operator()(int r, int c) const { return v[r * C + c]; }
+  T& operator[](int i) { return v[i]; }
+  const T& operator[](int i) const { return v[i]; }
   Mat& operator+=(const Mat& o) {
     for (int i = 0; i < R * C; ++i) v[i] += o.v[i];
     return *this;
@@ -25,12 +28,12 @@ struct Mat {
   }
 };
 
-template <int N>
-using Vec = Mat<N, 1>;
+template <int N, class T = double>
+using Vec = Mat<N, 1, T>;
 
-template <int R, int K, int C>
-Mat<R, C> times(const Mat<R, K>& a, const Mat<K, C>& b) {
-  Mat<R, C> out;
+template <int R, int K, int C, class T>
+[[gnu::always_inline]] inline Mat<R, C, T> times(const Mat<R, K>& a, const Mat<K, C, T>& b) {
+  Mat<R, C, T> out;
   for (int r = 0; r < R; ++r)
     for (int k = 0; k < K; ++k)
       for (int c = 0; c < C; ++c) out(r, c) += a(r, k) * b(k, c);
@@ -38,9 +41,9 @@ Mat<R, C> times(const Mat<R, K>& a, const Mat<K, C>& b) {
 }
 
 // aᵀ b
-template <int K, int R, int C>
-Mat<R, C> transpose_times(const Mat<K, R>& a, const Mat<K, C>& b) {
-  Mat<R, C> out;
+template <int K, int R, int C, class T>
+[[gnu::always_inline]] inline Mat<R, C, T> transpose_times(const Mat<K, R>& a, const Mat<K, C, T>& b) {
+  Mat<R, C, T> out;
   for (int k = 0; k < K; ++k)
     for (int r = 0; r < R; ++r)
       for (int c = 0; c < C; ++c) out(r, c) += a(k, r) * b(k, c);
@@ -100,8 +103,8 @@ int factorize(Mat<N, N>& a) {
   return negative;
 }
 
-template <int N, int C>
-void solve_factored(const Mat<N, N>& factor, Mat<N, C>& b) {
+template <int N, int C, class T>
+[[gnu::always_inline]] inline void solve_factored(const Mat<N, N>& factor, Mat<N, C, T>& b) {
   for (int c = 0; c < C; ++c) {
     for (int i = 0; i < N; ++i)
       for (int k = 0; k < i; ++k) b(i, c) -= factor(i, k) * b(k, c);
@@ -110,6 +113,36 @@ void solve_factored(const Mat<N, N>& factor, Mat<N, C>& b) {
       for (int k = i + 1; k < N; ++k) b(i, c) -= factor(k, i) * b(k, c);
     }
   }
+}
+
+// Columns of a matrix that are computed as one: two where their number is even, or else all of them.
+template <int C>
+inline constexpr int kBlock = C % 2 == 0 ? 2 : C;
+
+template <int R, int C>
+[[gnu::always_inline]] inline auto columns(const Mat<R, C>& a, int first) {
+  if constexpr (kBlock<C> == C) {
+    return a;
+  } else {
+    Vec<R, Pack<2>> out;
+    for (int r = 0; r < R; ++r) std::memcpy(&out[r].v, &a(r, first), sizeof out[r].v);
+    return out;
+  }
+}
+
+template <int R, int C>
+[[gnu::always_inline]] inline void set_columns(Mat<R, C>& a, int, const Mat<R, C>& all) {
+  a = all;
+}
+template <int R, int C>
+[[gnu::always_inline]] inline void set_columns(Mat<R, C>& a, int first, const Vec<R, Pack<2>>& two) {
+  for (int r = 0; r < R; ++r) std::memcpy(&a(r, first), &two[r].v, sizeof two[r].v);
+}
+
+// a ← a b
+template <int R, int N>
+void multiply(Mat<R, N>& a, const Mat<N, N>& b) {
+  a = times(a, b);
 }
 
 }  // namespace ccr

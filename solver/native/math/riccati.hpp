@@ -2,7 +2,7 @@
 // x⁺ = A x + B u, x_0 = 0.
 #pragma once
 
-#include <cstddef>
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -28,7 +28,8 @@ class Riccati {
 
   // Adds a term of H that couples the state of a node (rows) with that of the next node (columns).
   void couple(int node, const Mat<NX, NX>& cross) {
-    const Mat<NX, NX> along = times(cross, stages[node].a);
+    Mat<NX, NX> along = cross;
+    multiply(along, stages[node].a);
     for (int r = 0; r < NX; ++r)
       for (int c = 0; c < NX; ++c) node_hessian[node](r, c) += along(r, c) + along(c, r);
     const Mat<NX, NU> turned = times(cross, stages[node].b);
@@ -41,33 +42,26 @@ class Riccati {
   int factor(double damping, int allowed = 0) {
     Mat<NX, NX> p;
     int negative = 0;
-    bool idle = true;  // whether no term acts on a state so far
-    for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
+    idle_ = static_cast<int>(stages.size());
+    for (int i = idle_ - 1; i >= 0; --i) {
       const Stage& s = stages[i];
-      idle = idle && node_hessian[i + 1].v == Mat<NX, NX>{}.v && s.hux.v == Mat<NU, NX>{}.v;
-      if (idle) {
-        Mat<NU, NU> quu = s.huu;
-        for (int k = 0; k < NU; ++k) quu(k, k) += damping;
-        const int pivots = factorize(quu);
-        if (pivots < 0 || (negative += pivots) > allowed) return -1;
-        factor_[i] = quu;
-        gain_[i] = {};
-        continue;
+      if (idle_ == i + 1 && node_hessian[i + 1].v == Mat<NX, NX>{}.v && s.hux.v == Mat<NU, NX>{}.v) idle_ = i;
+      Mat<NU, NU>& quu = factor_[i];
+      Mat<NU, NX> qux;
+      if (i < idle_) {
+        p += node_hessian[i + 1];
+        for (int c = 0; c < NX; c += kBlock<NX>) set_columns(qux, c, transpose_times(s.b, columns(p, c)));
+        quu = times(qux, s.b);
+        quu += s.huu;
+        multiply(qux, s.a);
+        qux += s.hux;
+      } else {
+        quu = s.huu;
       }
-      p += node_hessian[i + 1];
-      const Mat<NU, NX> btp = transpose_times(s.b, p);
-      Mat<NU, NU> quu = times(btp, s.b);
-      quu += s.huu;
       for (int k = 0; k < NU; ++k) quu(k, k) += damping;
-      Mat<NU, NX> qux = times(btp, s.a);
-      qux += s.hux;
       const int pivots = factorize(quu);
       if (pivots < 0 || (negative += pivots) > allowed) return -1;
-      factor_[i] = quu;
-      gain_[i] = qux;
-      solve_factored(quu, gain_[i]);
-      p = transpose_times(s.a, times(p, s.a));
-      p -= transpose_times(qux, gain_[i]);
+      if (i < idle_) eliminate(i, qux, p);
     }
     return negative;
   }
@@ -94,46 +88,79 @@ class Riccati {
   // Solves for several right-hand sides: H⁻¹ times the forces, or -H⁻¹ times the gradient. Follows a factor that
   // returned true.
   void respond(std::span<const Load> loads) {
+    for (; NX > 3 && loads.size() >= 4; loads = loads.subspan(4)) sweep<4>(loads.data());
     for (; loads.size() >= 2; loads = loads.subspan(2)) sweep<2>(loads.data());
     if (!loads.empty()) sweep<1>(loads.data());
   }
 
  private:
-  // Solves W right-hand sides side by side: the operations of one depend on each other, those of several do not.
+  // Eliminates the controls of a segment: p ← aᵀ p a - quxᵀ quu⁻¹ qux.
+  void eliminate(int i, const Mat<NU, NX>& qux, Mat<NX, NX>& p) {
+    multiply(p, stages[i].a);
+    for (int c = 0; c < NX; c += kBlock<NX>) {
+      auto gain = columns(qux, c);
+      solve_factored(factor_[i], gain);
+      set_columns(gain_[i], c, gain);
+      auto column = transpose_times(stages[i].a, columns(p, c));
+      column -= transpose_times(qux, gain);
+      set_columns(p, c, column);
+    }
+  }
+
+  // Solves W right-hand sides side by side. Beyond `reach` none acts, and neither does anything act on a state.
   template <int W>
   void sweep(const Load* loads) {
-    Vec<NX> v[W];
-    for (int i = static_cast<int>(stages.size()) - 1; i >= 0; --i) {
+    using Lanes = Pack<W>;
+    const int n = static_cast<int>(stages.size());
+    Vec<NX, Lanes> v;
+    int reach = 0;
+    for (int k = 0; k < W; ++k) {
+      if (loads[k].slope) reach = n;
+      for (const Force& force : loads[k].forces) reach = std::max(reach, force.node + force.split);
+    }
+    for (int i = reach; i < n; ++i)
+      for (int k = 0; k < W; ++k) loads[k].du[i] = {};
+    for (int i = reach - 1; i >= 0; --i) {
       const Stage& s = stages[i];
-      for (int k = 0; k < W; ++k) {
+      for (int k = 0; k < W; ++k)
         for (const Force& force : loads[k].forces) {
-          if (force.node == i + 1) v[k] -= force.here;
-          if (force.node == i && force.split) v[k] -= force.next;
+          if (force.node == i + 1) subtract(force.here, k, v);
+          if (force.node == i && force.split) subtract(force.next, k, v);
         }
-        Vec<NU> h = transpose_times(s.b, v[k]);
-        if (loads[k].slope) h += loads[k].slope[i];
-        v[k] = transpose_times(s.a, v[k]);
-        v[k] -= transpose_times(gain_[i], h);
-        solve_factored(factor_[i], h);
-        loads[k].du[i] = h;
+      Vec<NU, Lanes> h = transpose_times(s.b, v);
+      for (int k = 0; k < W; ++k)
+        for (int c = 0; c < NU && loads[k].slope; ++c) h[c].v[k] += loads[k].slope[i][c];
+      v = transpose_times(s.a, v);
+      if (i < idle_) v -= transpose_times(gain_[i], h);
+      solve_factored(factor_[i], h);
+      for (int k = 0; k < W; ++k)
+        for (int c = 0; c < NU; ++c) loads[k].du[i][c] = h[c].v[k];
+    }
+    Vec<NX, Lanes> x;
+    for (int k = 0; k < W; ++k) loads[k].dx[0] = {};
+    for (int i = 0; i < n; ++i) {
+      Vec<NU, Lanes> u;
+      if (i < idle_) u = times(gain_[i], x);
+      for (int k = 0; k < W; ++k)
+        for (int c = 0; c < NU; ++c) u[c].v[k] += loads[k].du[i][c];
+      for (int c = 0; c < NU; ++c) u[c] = -u[c];
+      x = times(stages[i].a, x);
+      x += times(stages[i].b, u);
+      for (int k = 0; k < W; ++k) {
+        for (int c = 0; c < NU; ++c) loads[k].du[i][c] = u[c].v[k];
+        for (int c = 0; c < NX; ++c) loads[k].dx[i + 1][c] = x[c].v[k];
       }
     }
-    Vec<NX> x[W];
-    for (int k = 0; k < W; ++k) loads[k].dx[0] = {};
-    for (std::size_t i = 0; i < stages.size(); ++i)
-      for (int k = 0; k < W; ++k) {
-        Vec<NU> u = times(gain_[i], x[k]);
-        u += loads[k].du[i];
-        for (int c = 0; c < NU; ++c) u[c] = -u[c];
-        x[k] = times(stages[i].a, x[k]);
-        x[k] += times(stages[i].b, u);
-        loads[k].du[i] = u;
-        loads[k].dx[i + 1] = x[k];
-      }
+  }
+
+  template <int W>
+  static void subtract(const Vec<NX>& force, int lane, Vec<NX, Pack<W>>& from) {
+    for (int c = 0; c < NX; ++c) from[c].v[lane] -= force[c];
   }
 
   std::vector<Mat<NU, NX>> gain_;
   std::vector<Mat<NU, NU>> factor_;
+  int idle_ = 0;  // the stage from which on nothing acts on a state, so that the gains are 0
 };
 
 }  // namespace ccr

@@ -8,8 +8,10 @@ namespace ccr {
 template <int D>
 using Position = Vec<D>;
 
-inline Vec<3> cross(const Vec<3>& a, const Vec<3>& b) {
-  return {{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}};
+template <class A, class B>
+auto cross(const Vec<3, A>& a, const Vec<3, B>& b) {
+  return Vec<3, decltype(a[0] * b[0])>{
+      {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}};
 }
 
 // Derivative of the end of a lever in the rotation.

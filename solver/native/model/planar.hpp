@@ -16,21 +16,20 @@ struct PlanarTransition {
   double x, y;
 };
 
-template <int N>
-Vec<N> times(const PlanarTransition& a, Vec<N> s) {
+template <int N, class T>
+Vec<N, T> times(const PlanarTransition& a, Vec<N, T> s) {
   s[0] += a.x * s[2];
   s[1] += a.y * s[2];
   return s;
 }
 
 template <int R, int N>
-Mat<R, N> times(Mat<R, N> m, const PlanarTransition& a) {
+void multiply(Mat<R, N>& m, const PlanarTransition& a) {
   for (int r = 0; r < R; ++r) m(r, 2) += m(r, 0) * a.x + m(r, 1) * a.y;
-  return m;
 }
 
-template <int N, int C>
-Mat<N, C> transpose_times(const PlanarTransition& a, Mat<N, C> m) {
+template <int N, int C, class T>
+Mat<N, C, T> transpose_times(const PlanarTransition& a, Mat<N, C, T> m) {
   for (int c = 0; c < C; ++c) m(2, c) += a.x * m(0, c) + a.y * m(1, c);
   return m;
 }

@@ -14,26 +14,25 @@ struct SpatialTransition {
   Vec<3> chord;  // in the base frame
 };
 
-template <int N>
-Vec<N> times(const SpatialTransition& a, Vec<N> s) {
-  const Vec<3> motion = cross({{s[3], s[4], s[5]}}, a.chord);
+template <int N, class T>
+[[gnu::always_inline]] inline Vec<N, T> times(const SpatialTransition& a, Vec<N, T> s) {
+  const Vec<3, T> motion = cross(Vec<3, T>{{s[3], s[4], s[5]}}, a.chord);
   for (int k = 0; k < 3; ++k) s[k] += motion[k];
   return s;
 }
 
 template <int R, int N>
-Mat<R, N> times(Mat<R, N> m, const SpatialTransition& a) {
+void multiply(Mat<R, N>& m, const SpatialTransition& a) {
   for (int r = 0; r < R; ++r) {
-    const Vec<3> moment = cross(a.chord, {{m(r, 0), m(r, 1), m(r, 2)}});
+    const Vec<3> moment = cross(a.chord, Vec<3>{{m(r, 0), m(r, 1), m(r, 2)}});
     for (int k = 0; k < 3; ++k) m(r, 3 + k) += moment[k];
   }
-  return m;
 }
 
-template <int N, int C>
-Mat<N, C> transpose_times(const SpatialTransition& a, Mat<N, C> m) {
+template <int N, int C, class T>
+[[gnu::always_inline]] inline Mat<N, C, T> transpose_times(const SpatialTransition& a, Mat<N, C, T> m) {
   for (int c = 0; c < C; ++c) {
-    const Vec<3> moment = cross(a.chord, {{m(0, c), m(1, c), m(2, c)}});
+    const Vec<3, T> moment = cross(a.chord, Vec<3, T>{{m(0, c), m(1, c), m(2, c)}});
     for (int k = 0; k < 3; ++k) m(3 + k, c) += moment[k];
   }
   return m;
@@ -88,8 +87,8 @@ void assemble_stage(const Bend& bend, const Vec<3>& chord, const Mat<3, 3>& fram
     }
   stage.hux = {};
   for (int k = 0; k < 3; ++k) {
-    const Vec<3> swung = cross({{chord_slope(0, k), chord_slope(1, k), chord_slope(2, k)}}, force);
-    const Vec<3> twisted = cross({{turn_slope(0, k), turn_slope(1, k), turn_slope(2, k)}}, moment);
+    const Vec<3> swung = cross(Vec<3>{{chord_slope(0, k), chord_slope(1, k), chord_slope(2, k)}}, force);
+    const Vec<3> twisted = cross(Vec<3>{{turn_slope(0, k), turn_slope(1, k), turn_slope(2, k)}}, moment);
     for (int c = 0; c < 3; ++c) stage.hux(k, 3 + c) = swung[c] + twisted[c] / 2;
   }
 }

@@ -59,8 +59,8 @@ void SpatialRod::take_up_cables() {
   for (int k = 0; k < cables_.count(); ++k) {
     const int end = cables_[k].end;
     SpatialArcLaw::take(end, length_, cables_[k].hole.v.data(), controls_, laws_, taken_[k]);
-    for (int i = 0; i < end; ++i)
-      cables_.take(k, i, taken_[k].at(0, i), {{taken_[k].at(1, i), taken_[k].at(2, i), taken_[k].at(3, i)}});
+    const double *value = taken_[k].row(0), *x = taken_[k].row(1), *y = taken_[k].row(2), *z = taken_[k].row(3);
+    for (int i = 0; i < end; ++i) cables_.take(k, i, value[i], {{x[i], y[i], z[i]}});
   }
 }
 

@@ -29,6 +29,12 @@ void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> n
 }
 
 template <class Model>
+void ContactProblem<Model>::place_all() const {
+  if (!all_placed_) place_points<Model>(robot_, nodes_, frames(), points_);
+  all_placed_ = true;
+}
+
+template <class Model>
 void ContactProblem<Model>::update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts) {
   std::copy(nodes.begin(), nodes.end(), origin_.begin());
   mount_origin_ = mounts;
@@ -69,12 +75,15 @@ void ContactProblem<Model>::measure_gaps() {
         i += static_cast<int>(std::min(distance / model_.segment_length(), static_cast<double>(n)));
         continue;
       }
-      for (int start = i * stride; start < points; start += positions)
+      if (stride > 1) place_all();
+      for (int start = i * stride; start < points; start += positions) {
+        if (stride == 1) place(i, robot_.lines[start / positions], points_[start]);
         for (int k = start; k < start + (i < n ? stride : 1); ++k) {
           if (!obstacle.touchable[k]) continue;
           ccr::measure_gaps(obstacle, std::span<const Position>(&points_[k], 1), moved, &gaps_[first + k]);
           near_.push_back(first + k);
         }
+      }
     }
   }
 }
@@ -98,7 +107,7 @@ void ContactProblem<Model>::measure_slacks_and_disks(const Command& command) req
 template <class Model>
 void ContactProblem<Model>::all_gaps(double* gaps) const {
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
-    ccr::measure_gaps(obstacles_[j], std::span<const Position>(points_), displacement(static_cast<int>(j)), gaps);
+    ccr::measure_gaps(obstacles_[j], std::span<const Position>(points()), displacement(static_cast<int>(j)), gaps);
     for (std::size_t k = 0; k < points_.size() && !obstacles_[j].everywhere; ++k)
       if (!obstacles_[j].touchable[k]) gaps[k] = std::numeric_limits<double>::infinity();
     gaps += points_.size();
@@ -111,6 +120,7 @@ void ContactProblem<Model>::all_gaps(double* gaps) const {
   template void ContactProblem<Model>::update_broadphase(std::span<const Position>, const std::vector<Position>&); \
   template bool ContactProblem<Model>::out_of_reach(int, double) const;                                            \
   template void ContactProblem<Model>::measure_gaps();                                                             \
+  template void ContactProblem<Model>::place_all() const;                                                          \
   template void ContactProblem<Model>::all_gaps(double*) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

@@ -54,7 +54,7 @@ bool ContactProblem<Model>::evaluate(const Iterate& at) {
   if (barrier_enabled_) add_barrier(at.controls);
   for (int i = 0; i <= robot_.segments; ++i)
     for (int k = 0; k < kSpace; ++k) nodes_[i][k] = states()[i][k];
-  place_points<Model>(robot_, nodes_, frames(), points_);
+  all_placed_ = false;
   measure_gaps();
   if constexpr (Model::kRod) measure_slacks_and_disks(at.command);
   return true;
@@ -120,6 +120,7 @@ void ContactProblem<Model>::set_free_shape(Iterate& at) {
 template <class Model>
 ContactProblem<Model>::Position ContactProblem<Model>::point(int contact) const {
   const int mount = this->mount(contact);
+  if (std::isinf(gaps_[contact])) place_all();  // an active contact that is out of reach now
   const Position& point = points_[contact % points_.size()];
   return mount < 0 ? point : minus(point, displacements_[mount]);
 }

@@ -127,7 +127,10 @@ class ContactProblem {
   double energy_scale() const { return robot_.energy_scale(model_.segment_length() * robot_.segments); }
   const std::vector<State>& states() const { return model_.states; }
   const std::vector<Frame>& frames() const { return model_.frames; }
-  const std::vector<Position>& points() const { return points_; }  // by line and position [mm]
+  const std::vector<Position>& points() const {  // by line and position [mm]
+    place_all();
+    return points_;
+  }
   // Contacts within reach, and the gap of every contact, infinite out of reach [mm].
   const std::vector<int>& near_contacts() const { return near_; }
   const std::vector<double>& gaps() const { return gaps_; }
@@ -178,6 +181,12 @@ class ContactProblem {
   void add_barrier(const std::vector<Control>& controls);
   void update_springs(const std::vector<Position>& mounts);
   void measure_gaps();
+  // Those of a shape are placed where they are looked at: most are out of reach of all obstacles.
+  void place_all() const;
+  void place(int node, const Vec<2>& line, Position& point) const {
+    point = nodes_[node];
+    point += Model::lever(frames()[node], line);
+  }
   void measure_slacks_and_disks(const Command& command) requires(Model::kRod);
   void push_disks(const ActiveSet& active) requires(Model::kRod);
   int disk_segment(int contact) const { return (contact - first_disk_contact()) / Model::kDiskSides; }
@@ -202,7 +211,8 @@ class ContactProblem {
   std::vector<double> clear_;           // of each obstacle: motion of the nodes before it is within reach
   double drift_ = 0;                    // largest motion of a node from that shape
   std::vector<Position> nodes_;
-  std::vector<Position> points_;
+  mutable std::vector<Position> points_;
+  mutable bool all_placed_ = false;
   std::vector<Site> sites_;  // of the points
   std::vector<double> gaps_;
   std::vector<int> near_;

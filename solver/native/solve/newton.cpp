@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "model/models.hpp"
 
@@ -174,6 +175,8 @@ double Newton<Model>::line_search(const Iterate& at, const ActiveSet& target, do
 
 template <class Model>
 NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
+  // A factorisation of the rod in space costs as much as several corrections: it serves while these shrink fast.
+  constexpr bool kReuses = Model::kRod && Model::kSpace == 3;
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
   choose_test();
@@ -187,12 +190,16 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
       return result;
     }
     ActiveSet target = at.active;
-    if (close) {  // the last factorisation serves once more
+    if (close) {  // the last factorisation serves again
       close = false;
       if (qp_.correct(problem, kkt_, target, step_)) {
         advance(at, 1, step_, at);
         at.active = target;
         if (!problem.evaluate(at)) return result;
+        if constexpr (kReuses) {
+          const double last = std::exchange(step_size_, step_size(step_));
+          close = step_size_ <= kCorrectionRate * last;
+        }
         continue;
       }
       target = at.active;
@@ -211,7 +218,7 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
     std::swap(at.mounts, trial_.mounts);
     blend(at.active, scale, target);
     at.active = target;
-    close = step_size_ <= kNewtonClose;
+    close = step_size_ <= (kReuses ? kReuseClose : kNewtonClose);
   }
   return result;
 }

@@ -12,8 +12,9 @@ namespace ccr {
 template <class Model>
 double ModelContinuation<Model>::largest_motion() const {
   double of_points = 0, of_mounts = 0;  // squared
+  const std::vector<Position>& points = problem_.points();
   for (std::size_t k = 0; k < points_.size(); ++k) {
-    const Position move = minus(problem_.points()[k], points_[k]);
+    const Position move = minus(points[k], points_[k]);
     of_points = std::max(of_points, dot(move, move));
   }
   for (std::size_t m = 0; m < trial_.mounts.size(); ++m) {
