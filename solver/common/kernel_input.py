@@ -1,4 +1,4 @@
-"""Obstacles as the kernel takes them."""
+"""Obstacles and rods as the kernel takes them."""
 
 from typing import TypedDict
 
@@ -10,6 +10,7 @@ from solver.common.gap_laws import GapLaw, gap_function
 from solver.common.geometry import touchable_points
 from solver.common.obstacle import SHAPES, Obstacle
 from solver.common.robot import AnyRobot
+from solver.common.rod import AnyRod, full_cables, least_cable_mm
 from solver.common.scene import Scene
 
 
@@ -52,4 +53,28 @@ def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> 
         touchable=touchable,
         spring=obstacle.spring_matrix.astype(float),
         law=function_address(gap_function(law)) if law.kind == "custom" else 0,
+    )
+
+
+def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray) -> _kernel.Rod:
+    """Return what the kernel needs to know of a rod.
+
+    Args:
+        robot: The robot.
+        stiffness: EI, in space also GJ, of each segment over the robot's rigidity, ``(n,)`` or ``(n, 3)``.
+        rest: Angles of each segment at rest, likewise [rad].
+    """
+    cables, weight = full_cables(robot), (*robot.weight_per_length, 0.0)[:3]
+    loads = [
+        _kernel.Load(node=load.node, at=load.place_mm, force=(*load.force, 0.0)[:3], moment=load.moment)
+        for load in robot.loads
+    ]
+    return _kernel.Rod(
+        holes=[cable.hole_mm for cable in cables],
+        ends=[cable.end or robot.segments for cable in cables],
+        stiffness=np.ascontiguousarray(stiffness, float),
+        rest=np.ascontiguousarray(rest, float),
+        weight=weight,
+        loads=loads,
+        least_pull=least_cable_mm(robot),
     )

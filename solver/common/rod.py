@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 
-from solver import _kernel
 from solver.common.robot import OFFSETS, AnyRobot
 from solver.common.validation import (
     check_finite,
@@ -22,7 +21,7 @@ from solver.common.validation import (
     refusal,
 )
 
-MAX_CABLES = _kernel.MAX_CABLES
+MAX_CABLES = 12  # kMaxCables of the kernel
 STIFFNESSES = (1e-3, 1e3)  # of a segment, over the robot's rigidity
 MOST_LOAD = 1e4  # a load or the whole weight, over EI/L²
 MOST_TURN = 1.5  # precurvature of a segment [rad]
@@ -289,27 +288,3 @@ def check_cables(robot: AnyRobot, name: str, cables_mm: object) -> tuple[float, 
     if len(entries) != count:
         raise refusal(name, cables_mm, bound)
     return tuple(check_number(f"an entry of {name}", entry, low, high, bound) for entry in entries)
-
-
-def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray) -> _kernel.Rod:
-    """Return what the kernel needs to know of a rod.
-
-    Args:
-        robot: The robot.
-        stiffness: EI, in space also GJ, of each segment over the robot's rigidity, ``(n,)`` or ``(n, 3)``.
-        rest: Angles of each segment at rest, likewise [rad].
-    """
-    cables, weight = full_cables(robot), (*robot.weight_per_length, 0.0)[:3]
-    loads = [
-        _kernel.Load(node=load.node, at=load.place_mm, force=(*load.force, 0.0)[:3], moment=load.moment)
-        for load in robot.loads
-    ]
-    return _kernel.Rod(
-        holes=[cable.hole_mm for cable in cables],
-        ends=[cable.end or robot.segments for cable in cables],
-        stiffness=np.ascontiguousarray(stiffness, float),
-        rest=np.ascontiguousarray(rest, float),
-        weight=weight,
-        loads=loads,
-        least_pull=least_cable_mm(robot),
-    )

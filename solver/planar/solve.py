@@ -7,9 +7,9 @@ import numpy as np
 from solver import _kernel
 from solver.common.checks import check_core, check_origin, check_rest, check_scene
 from solver.common.equilibrium import Optimality
-from solver.common.kernel_input import kernel_obstacles
+from solver.common.kernel_input import kernel_obstacles, kernel_rod
 from solver.common.layout import PLANE
-from solver.common.rod import bending_ratios, check_cables, kernel_rod
+from solver.common.rod import bending_ratios, check_cables
 from solver.common.scene import Scene
 from solver.common.trace import Trace, read_trace
 from solver.planar.equilibrium import Equilibrium
