@@ -49,7 +49,7 @@ soak: $(INSTALL)
 	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
 	$(BIN)/python -m pytest -k fuzz --hypothesis-profile=default
 
-$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/* solver/native/*/*) solver/common/gap_laws.py solver/planar/formulation.py solver/spatial/formulation.py solver/codegen.py
+$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/* solver/native/*/*) solver/common/gap_laws.py solver/planar/formulation.py solver/spatial/arc.py solver/spatial/formulation.py solver/codegen.py
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	touch $@
