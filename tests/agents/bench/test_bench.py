@@ -1,5 +1,6 @@
 """The benchmarks run; what they find is not tested."""
 
+import numpy as np
 import pytest
 
 from agents.bench import kernel, report, space, throughput
@@ -24,7 +25,7 @@ def test_learning():
 
 def test_kernel():
     assert len(list(kernel.contact_mix(200))) == 200
-    assert min(kernel.batch_times(4, steps=3)) > 0
+    assert np.isfinite(kernel.batch_times(4, steps=3)).all()
     assert kernel.cost([kernel.PUSHED, *kernel.FAR], repeats=2) > 0
 
 
