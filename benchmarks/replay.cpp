@@ -52,7 +52,8 @@ int replay(Recording& recording) {
     continuation->set_obstacles(obstacles);
     std::vector<double> to(continuation->layout().size);
     for (int left = recording.count(); left > 0; --left, ++steps) {
-      const std::vector<double> command = recording.numbers(continuation->layout().cables.size + 1), from = recording.numbers(to.size());
+      const std::vector<double> command = recording.numbers(continuation->layout().cables.size + 1),
+                                from = recording.numbers(to.size());
       continuation->follow(from.data(), command.data(), to.data());
     }
   }
