@@ -3,8 +3,11 @@
 Whatever the user can correct is reported in one line; anything else is a bug and keeps its traceback.
 """
 
+import signal
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 
 from agents.errors import UserError
@@ -17,8 +20,9 @@ def main() -> None:
     """Run the command line and exit with its code."""
     before, threading.excepthook = threading.excepthook, _report_bugs
     try:
-        import_module("ccr_gym").check_packages()
-        from agents.commands import run  # here, so that an interrupt while it loads is caught
+        with _interrupts_held():
+            import_module("ccr_gym").check_packages()
+            from agents.commands import run  # here, so that an interrupt while it loads is caught
 
         run()
     except ImportError as error:
@@ -35,6 +39,16 @@ def main() -> None:
         _exit(f"{error.filename}: {error.strerror}" if error.filename else str(error), FAILED)
     finally:
         threading.excepthook = before
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Keep an interrupt until the end of the block: packages may swallow one while they load."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _report_bugs(caught: threading.ExceptHookArgs) -> None:

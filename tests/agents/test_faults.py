@@ -116,7 +116,7 @@ def test_a_bug_shows_where_it_is_and_an_interrupt_does_not(name, monkeypatch, ca
 
 
 @pytest.mark.parametrize("name", ["train", "evaluate", "retrain"])
-@pytest.mark.parametrize("seconds", [0.5, 6.0], ids=["loading", "working"])
+@pytest.mark.parametrize("seconds", [0.2, 6.0], ids=["loading", "working"])
 def test_an_interrupt_ends_a_command_in_one_line_and_leaves_no_process(name, seconds, tmp_path):
     """As in a terminal, all processes of the command get the signal."""
     process = started(name, "--run" if name == "train" else "--out", tmp_path / "out", start_new_session=True)

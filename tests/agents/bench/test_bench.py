@@ -25,7 +25,9 @@ def test_learning():
 
 def test_kernel():
     assert len(list(kernel.contact_mix(200))) == 200
-    assert np.isfinite(kernel.batch_times(4, steps=3)).all()
+    alone, one_thread, two_threads = kernel.batch_times(4, steps=3)  # alone less the overhead of a call
+    assert np.isfinite(alone)
+    assert min(one_thread, two_threads) > 0
     assert kernel.cost([kernel.PUSHED, *kernel.FAR], repeats=2) > 0
 
 
