@@ -21,7 +21,7 @@ from ccr_gym.envs import (
 from ccr_gym.episodes import PrivilegedState
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
-from ccr_gym.scales import AHEAD, FORCE_SCALE_N
+from ccr_gym.scales import AHEAD, FORCE_SPAN, Scales
 from ccr_gym.sensing import Sensing
 from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
 from ccr_gym.tasks import (
@@ -40,7 +40,7 @@ from ccr_gym.vector_env import ContactVectorEnv, make_vector_env
 __all__ = [
     "AHEAD",
     "ENV_IDS",
-    "FORCE_SCALE_N",
+    "FORCE_SPAN",
     "ActionSpec",
     "Assignment",
     "BracedPush",
@@ -56,6 +56,7 @@ __all__ = [
     "PushObstacle",
     "PushObstacleEnv",
     "RewardWeights",
+    "Scales",
     "Sensing",
     "Settings",
     "SoftObstacle",

@@ -6,16 +6,19 @@ import numpy as np
 
 
 class ActionSpec(NamedTuple):
-    """Bounds and increments of the actuated coordinates: the cable displacements, then the length if it is actuated.
+    """Bounds and increments of the actuated coordinates.
+
+    They are a signed cable displacement for each section, in space one along x and one along y, and the length where
+    the base inserts the robot.
 
     Attributes:
-        cables: Number of cable displacements.
+        commands: Number of cable displacements, as :class:`solver.Actuation` maps them to cables.
         low_mm: Lower bounds, ``(actions,)`` [mm].
         high_mm: Upper bounds, ``(actions,)`` [mm].
         increment_mm: Moves of full actions, ``(actions,)`` [mm].
     """
 
-    cables: int
+    commands: int
     low_mm: np.ndarray
     high_mm: np.ndarray
     increment_mm: np.ndarray

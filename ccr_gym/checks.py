@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from types import UnionType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -53,6 +53,20 @@ def checked(default: T, check: Callable[..., object], /, **bounds: object) -> T:
         **bounds: Keyword arguments of the check.
     """
     return field(default=default, metadata={"check": partial(check, **bounds)})
+
+
+def derived(check: Callable[..., object], /, **bounds: object) -> Any:
+    """Declare a dataclass field that follows from others unless it is given; its owner fills in what is ``None``.
+
+    Args:
+        check: As of :func:`checked`, for a value that is given.
+        **bounds: Keyword arguments of the check.
+    """
+
+    def check_given(name: str, value: object) -> object:
+        return None if value is None else check(name, value, **bounds)
+
+    return field(default=None, metadata={"check": check_given})
 
 
 def nested(kind: type[DataclassT], default: Callable[[], DataclassT] | None = None, **usual: object) -> DataclassT:

@@ -14,10 +14,11 @@ from ccr_gym.checks import check_array, check_choice, check_names, check_seed, c
 from ccr_gym.episodes import EpisodeBatch, ForceReading, PrivilegedState
 from ccr_gym.rendering import Frame, Renderer
 from ccr_gym.reward import TERMS
-from ccr_gym.scales import FORCE_SCALE_N
+from ccr_gym.scales import FORCE_SPAN, Scales
 from ccr_gym.settings import AnySettings
 from ccr_gym.tasks import AnyTask, Assignment, check_force, check_task
 from solver import Equilibrium, Scene
+from solver.common.validation import is_listed
 from solver.spatial import SpatialEquilibrium
 
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -62,8 +63,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
 
         Args:
             seed: Seed of the environment's generator, a whole number from 0 on; ``None`` to keep the generator.
-            options: ``{"scene": Scene, "desired_force": float}`` to give scene and set-point instead of sampling them
-                [N]; the force is a vector where the task's set-point is one.
+            options: ``{"scene": Scene, "desired_force": float}`` to give scene, which may be a list of obstacles, and
+                set-point instead of sampling them [N]; the force is a vector where the task's set-point is one.
 
         Raises:
             RuntimeError: If no feasible scene is found: the task does not suit the robot.
@@ -71,7 +72,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             ValueError: If the seed is not a whole number from 0 on, or the options are incomplete or out of range.
         """
         seed = check_seed("seed", seed)
-        given = _given_assignment(options, self.task)
+        given = _given_assignment(options, self.task, self.settings.scales)
         generator = self._np_random, self._np_random_seed
         super().reset(seed=seed)
         try:
@@ -112,7 +113,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             return None
         self._renderer = self._renderer or Renderer(self.metadata["render_fps"])
         reading = self._episodes.read(0)
-        frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, FORCE_SCALE_N)
+        scale = FORCE_SPAN * self.settings.scales.force_n
+        frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, scale)
         if self.render_mode == "rgb_array":
             return self._renderer.draw(frame)
         self._renderer.show(frame)
@@ -128,6 +130,11 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
     def action_spec(self) -> ActionSpec:
         """Bounds and increments of what the actions move."""
         return self._episodes.actions
+
+    @property
+    def observation_slices(self) -> dict[str, slice]:
+        """Where the named parts of an observation stand in the flat one."""
+        return self._episodes.observer.slices
 
     @property
     def equilibrium(self) -> Equilibrium | SpatialEquilibrium:
@@ -196,7 +203,7 @@ def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others:
     return make(**given)
 
 
-def _given_assignment(options: Info | None, task: AnyTask) -> Assignment | None:
+def _given_assignment(options: Info | None, task: AnyTask, scales: Scales) -> Assignment | None:
     """Return scene and set-point of reset options, or None without any."""
     wanted = "None, or a mapping of both 'scene' and 'desired_force'"
     check_type("options", options, Mapping | None, wanted)
@@ -205,11 +212,13 @@ def _given_assignment(options: Info | None, task: AnyTask) -> Assignment | None:
     if set(options) != {"scene", "desired_force"}:
         raise refusal("options", options, wanted)
     scene, space = options["scene"], task.adapter.space
-    check_type("scene", scene, Scene)
+    if is_listed(scene):
+        scene = Scene(scene)
+    check_type("scene", scene, Scene, "a Scene or a list of obstacles")
     for obstacle in scene:
         if obstacle.space != space:
             raise refusal("scene", scene, f"of obstacles in {SPACES[space]}, not in {SPACES[obstacle.space]}")
     shape = (space,) if task.force_vector else ()
     force = check_array("desired_force", options["desired_force"], shape)
-    check_force("desired_force", math.hypot(*force) if shape else float(force))
+    check_force("desired_force", math.hypot(*force) if shape else float(force), scales.force_n)
     return Assignment(scene, force)

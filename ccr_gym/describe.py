@@ -8,8 +8,8 @@ from gymnasium import spaces
 
 from ccr_gym.adapters import AnyAdapter
 from ccr_gym.observation import Observer
-from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SCALE_MM, SUCCESS_ERROR
-from ccr_gym.scales import AHEAD, FORCE_SCALE_N, RADIUS_SCALE_MM
+from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SPAN, SUCCESS_ERROR
+from ccr_gym.scales import AHEAD, FORCE_SPAN, RADIUS_SPAN
 from ccr_gym.settings import AnySettings
 from ccr_gym.tasks import LEVELS, AnyTask
 from solver import Robot
@@ -33,24 +33,27 @@ def describe(task: AnyTask, title: str, description: str, start: str, *, action:
     parts = {
         "Description": description,
         "Action Space": _actions(adapter, action),
-        "Observation Space": f"""With `obs_mode="dict"` a `Dict` of float32 boxes, with `obs_mode="flat"` their
-            concatenation in this order. The indices are those of the flat form, for the default robot of
+        "Observation Space": f"""A float32 `Box` of the entries below, in this order (`observation_slices` says where
+            they stand); with `obs_mode="dict"` a `Dict` of them. The indices are those for the default robot of
             n = {settings.robot.segments} segments and ideal sensing; entries are clipped to their bounds.
 
 {_table(task, adapter, settings)}
 
             Without `force_sensor` the keys `force_error` and `force_measured` are absent.""",
         "Rewards": _rewards(settings, adapter.space),
-        "Starting State": start.format(**_field_texts(task)),
+        "Starting State": start.format(**_field_texts(task))
+        + f""" Lengths are multiples of the robot's length L, here {settings.scales.length_mm:g} mm, and forces of
+            EI/L², here {1000 * settings.scales.force_n:.3g} mN.""",
         "Episode End": f"No state is terminal. Episodes are truncated after {task.steps} steps.",
-        "Info": f"""`force_true` and `force_est` (force on the robot, ({adapter.space},) [N]), `desired_force` [N],
-            `cable_mm`, `tension` [N], `solver_status` (value of `solver.Status`), `cost` (force above `force_limit`
-            [N]), `is_success` (within {100 * SUCCESS_ERROR:g} % of the set-point), `reward_terms`.""",
+        "Info": f"""`force_true`, `force_est` and `force_est_paper` (force on the robot, ({adapter.space},) [N]),
+            `desired_force` [N], `cable_mm`, `tension` [N], `solver_status` (value of `solver.Status`), `cost` (force
+            above `force_limit` [N], a cost of a constrained MDP), `is_success` (within {100 * SUCCESS_ERROR:g} % of the
+            set-point), and the terms of the reward, `reward_force_error` and so on.""",
         "Arguments": f"""`render_mode`, the fields of `ccr_gym.settings.{type(settings).__name__}`, and `task`, given as
             `{type(task).__name__}` or as a mapping of its fields. Mappings make every argument JSON-able.
             `sensing="realistic"` adds backlash, latency, noise, bias, unknown friction and unknown rigidity, sampled
             anew in every episode. `split="train"` and `split="test"` sample from disjoint sets of scenes.""",
-        "Version History": "* v0: initial version.",
+        "Version History": "* v1: the rod, robots of any size; `-Paper-v1` is the paper's system to the letter.",
     }
     sections = [f"## {name}\n{_wrapped(text)}" for name, text in parts.items()]
     return title + "\n\n" + "\n\n".join(sections) + "\n"
@@ -60,9 +63,9 @@ def _actions(adapter: AnyAdapter, action: str) -> str:
     """Return the text of the action space."""
     action = action or "cable increment as a fraction of `max_increment_mm`; a positive one pulls"
     low, high = adapter.actions.low_mm, adapter.actions.high_mm
-    cables = "the cable displacement stays" if adapter.cables == 1 else "the cable displacements stay"
+    cables = "the cable displacement stays" if adapter.actions.commands == 1 else "the cable displacements stay"
     bounds = [f"{cables} within {low[0]:g} to {high[0]:g} mm (`cable_limit_mm`)"]
-    if adapter.actions.size > adapter.cables:
+    if adapter.actions.size > adapter.actions.commands:
         bounds.append(f"the length within {low[-1]:g} to {high[-1]:g} mm (`robot.length_range_mm`)")
     return f"""`Box(-1, 1, ({adapter.actions.size},), float32)`: {action}. A move is carried out as far as the tension
         limit and the obstacles allow; {", ".join(bounds)}. A full action moves by
@@ -73,20 +76,18 @@ def _rewards(settings: AnySettings, space: int) -> str:
     """Return the text of the rewards."""
     weights = settings.weights
     kind = "magnitudes, or vectors with `force_vector` where they are subtracted" if space == 3 else "magnitudes"
-    return f"""The sum of named terms, each in `info["reward_terms"]`; F is the energy-based contact force, F_d the
+    return f"""The sum of named terms, each in `info` as `reward_…`; F is the energy-based contact force, F_d the
         set-point, {kind}: `force_error` −{weights.force_error:g} min(|F−F_d|/F_d, 1); `accuracy` {weights.accuracy:g}
         exp(−{ACCURACY_RATE:g} |F−F_d|/F_d); `overshoot` −{weights.overshoot:g} min(max(F/F_d−1, 0), 1); `approach`
-        −{weights.approach:g} min(clearance / {CLEARANCE_SCALE_MM:g} mm, 1) while nothing touches; `effort`
+        −{weights.approach:g} min(clearance / {CLEARANCE_SPAN:.3g} L, 1) while nothing touches; `effort`
         −{weights.effort:g} times the mean square of the action."""
 
 
 def _field_texts(task: AnyTask) -> dict[str, object]:
-    """Return the fields of a task as texts, forces in mN, and the levels of a moving set-point."""
+    """Return the fields of a task as texts, and the levels of a moving set-point."""
     texts: dict[str, object] = {"levels": _text(LEVELS)}
     for declared in fields(task):
-        value = getattr(task, declared.name)
-        scaled = tuple(1000 * end for end in value) if declared.name.endswith("_n") else value
-        texts[declared.name] = _text(scaled)
+        texts[declared.name] = _text(getattr(task, declared.name))
     return texts
 
 
@@ -96,7 +97,7 @@ def _text(value: object) -> object:
         return f"{value:.3g}" if isinstance(value, float) else value
     if isinstance(value[0], tuple):
         return [_text(entry) for entry in value]
-    return "–".join(f"{end:g}" for end in value)
+    return "–".join(f"{end:.3g}" for end in value)
 
 
 def _table(task: AnyTask, adapter: AnyAdapter, settings: AnySettings) -> str:
@@ -116,7 +117,7 @@ def _table(task: AnyTask, adapter: AnyAdapter, settings: AnySettings) -> str:
 
 def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
     """Return meaning and scale of an entry of the observation."""
-    robot, force = settings.robot, f"{FORCE_SCALE_N:g} N"
+    robot, force = settings.robot, f"{FORCE_SPAN * settings.scales.force_n:.3g} N"
     planar, space = isinstance(robot, Robot), task.adapter.space
     lines = ", ".join(robot.touch) if planar else "backbone, first and second hole, opposite holes"
     length = f"{max(robot.lengths_mm) if isinstance(robot, Robot) else robot.length_mm:g} mm"
@@ -136,7 +137,7 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
             if planar
             else ("x, y, z of nodes 0…n, node by node", length)
         ),
-        "obstacle": ("centre x, y, z; axis of a cylinder, else 0; radius", f"{length}, 1, {RADIUS_SCALE_MM:g} mm"),
+        "obstacle": ("centre x, y, z; axis of a cylinder, else 0; radius", f"{length}, 1, {RADIUS_SPAN * settings.scales.length_mm:g} mm"),
     }[key]
 
 

@@ -19,8 +19,8 @@ from ccr_gym.tasks import (
 )
 
 CIRCLE = (
-    "The robot is straight, its cable slack. The obstacle's centre is uniform in x {x_mm} mm and y {y_mm} mm, its "
-    "radius in {radius_mm} mm, the set-point in {force_n} mN"
+    "The robot is straight, its cable slack. The obstacle's centre is uniform in x {x} L and y {y} L, its "
+    "radius in {radius} L, the set-point in {force} EI/L²"
 )
 FEASIBLE = (
     " Scenes are sampled until the obstacles leave the straight robot clear and a steady pull reaches the set-point "
@@ -60,8 +60,8 @@ class LoadCellEnv(TaskEnv):  # noqa: D101 - below
         "A flat load cell stands at a random distance from a planar cable-driven continuum robot. Pulling the cable "
         "bends the robot towards it until node 14, the paper's 15th, meets it (eq. 12); pulling further raises the "
         "contact force. The agent commands cable increments to hold a desired force.",
-        "The robot is straight, its cable slack. The distance is uniform in {distance_mm} mm, the set-point in "
-        "{force_n} mN; they are sampled until a steady pull reaches the set-point.",
+        "The robot is straight, its cable slack. The distance is uniform in {distance} L, the set-point in "
+        "{force} EI/L²; they are sampled until a steady pull reaches the set-point.",
     )
 
 
@@ -99,9 +99,9 @@ class BracedPushEnv(TaskEnv):  # noqa: D101 - below
         "Two circular obstacles as in the paper's Fig. 4b. The robot meets the lower one, leans on it, and reaches "
         "the upper one beyond, whose contact force is regulated; the force on the lower one changes with it. Some "
         "scenes are near a snap.",
-        "The robot is straight, its cable slack. The centre of the lower obstacle is uniform in x {brace_mm[0]} mm "
-        "and y {brace_mm[1]} mm, its radius in {brace_mm[2]} mm; those of the upper one in x {goal_mm[0]} mm, y "
-        "{goal_mm[1]} mm and {goal_mm[2]} mm; the set-point in {force_n} mN." + FEASIBLE,
+        "The robot is straight, its cable slack. The centre of the lower obstacle is uniform in x {brace[0]} L "
+        "and y {brace[1]} L, its radius in {brace[2]} L; those of the upper one in x {goal[0]} L, y "
+        "{goal[1]} L and {goal[2]} L; the set-point in {force} EI/L²." + FEASIBLE,
     )
 
 
@@ -112,7 +112,7 @@ class SoftObstacleEnv(TaskEnv):  # noqa: D101 - below
         "Push an obstacle on a spring of unknown stiffness with a desired force.",
         "As `PushObstacle`, but the obstacle is mounted on a spring and yields. The stiffness varies more than "
         "tenfold between episodes, and with it the force that a millimetre of cable adds.",
-        CIRCLE + ", the stiffness in {spring} N/mm, uniform in its logarithm." + FEASIBLE,
+        CIRCLE + ", the stiffness in {spring} EI/L³, uniform in its logarithm." + FEASIBLE,
     )
 
 
@@ -140,10 +140,10 @@ class SpatialPushEnv(TaskEnv):  # noqa: D101 - below
         'robot slip off to either side once the force is high enough. With `task={"force_vector": True}` the '
         "set-point is a force vector: `desired_force` and `force_error` have three components in [-1, 1], and the "
         "indices of later entries grow by two or four.",
-        "The robot is straight, its cables slack. The obstacle stands at a uniform azimuth, its centre {distance_mm} "
-        "mm off the axis and {height_mm} mm high, its radius uniform in {radius_mm} mm; a fraction of "
+        "The robot is straight, its cables slack. The obstacle stands at a uniform azimuth, its centre {distance} L "
+        "off the axis and {height} L high, its radius uniform in {radius} L; a fraction of "
         "{cylinder_fraction} are cylinders across the robot's path, tilted by up to {max_tilt} rad. The set-point is "
-        "uniform in {force_n} mN. With `force_vector` it is the force that a steady pull ends with, in a direction up "
+        "uniform in {force} EI/L². With `force_vector` it is the force that a steady pull ends with, in a direction up "
         "to {max_ramp_angle} rad from the obstacle's." + FEASIBLE,
         action="increments of both signed displacements as fractions of `max_increment_mm`; a positive displacement "
         "pulls the first cable of a pair, a negative one the opposite cable",

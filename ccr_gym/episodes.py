@@ -12,12 +12,13 @@ import numpy as np
 from ccr_gym.actions import ActionSpec
 from ccr_gym.adapters import AnyAdapter
 from ccr_gym.checks import require
+from ccr_gym.estimation import ForceEstimator, Measured
 from ccr_gym.observation import Observer
 from ccr_gym.quantities import EnvIndex, Quantity, as_scalar, norm, operations
 from ccr_gym.reward import SUCCESS_ERROR, TERMS, reward_terms
-from ccr_gym.sampling import check_robot, sample_feasible
+from ccr_gym.sampling import Trials, check_robot
 from ccr_gym.scales import AHEAD
-from ccr_gym.sensing import SensorModel
+from ccr_gym.sensing import Imperfections, SensorModel, sample_imperfections
 from ccr_gym.settings import AnySettings
 from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment
 from solver import Equilibrium
@@ -32,9 +33,11 @@ class ForceReading(NamedTuple):
 
     Attributes:
         blocks: Equilibria, ``(..., size)``.
-        force_true: Energy-based contact force on the robot that is regulated, ``(..., d)`` [N].
-        force_est: Its virtual-work estimate, ``(..., d)`` [N].
-        force: Magnitude of ``force_true`` [N].
+        force_true: Energy-based contact force on the robot, of the obstacle that matters, ``(..., d)`` [N].
+        force_est: Its estimate, ``(..., d)`` [N].
+        force_paper: Its estimate by eq. 11, ``(..., d)`` [N].
+        regulated: The one of them that is desired, ``(..., d)`` [N].
+        force: Magnitude of the regulated force [N].
         desired: Magnitude of the set-point [N].
         goal: The set-point, a magnitude or ``(..., d)`` [N].
         error: Relative force error.
@@ -43,6 +46,8 @@ class ForceReading(NamedTuple):
     blocks: np.ndarray
     force_true: np.ndarray
     force_est: np.ndarray
+    force_paper: np.ndarray
+    regulated: np.ndarray
     force: Quantity
     desired: Quantity
     goal: Quantity
@@ -76,12 +81,14 @@ class Pipeline(NamedTuple):
         batch: The robots.
         adapter: Adapter of the robots.
         observer: Writer of observations.
+        estimator: Estimator of the contact forces.
         sensors: Model of the imperfections; ``None`` where sensing is ideal.
     """
 
     batch: BaseBatch
     adapter: AnyAdapter
     observer: Observer
+    estimator: ForceEstimator
     sensors: SensorModel | None
 
 
@@ -108,24 +115,25 @@ class EpisodeBatch:
         check_robot(task, settings.robot)
         self._task, self._settings, self.count, self._threads = task, settings, count, threads
         self._target, self._vector = task.target, task.force_vector
-        self._trial_batch = task.adapter.make_batch(settings, count, task.obstacles, threads)
+        self._trials = Trials(task, settings, count, threads)
         self._use(self._make_pipeline(task.obstacles))
         actions, space = self.adapter.actions.size, self.adapter.space
         self._desired_n = np.ones(count)  # magnitudes of the set-points, the largest ones where they move
         self._goal_n = np.ones((count, space))  # the set-points where they are vectors
         self._profiles = np.ones((count, PROFILE_STEPS)) if task.moving else None
-        self._last_actions = np.zeros(count) if actions == 1 else np.zeros((count, actions))
+        self._actuated_mm, self._last_actions = np.zeros((count, actions)), np.zeros((count, actions))
         self._obstacle_features = np.zeros((count, self.adapter.obstacle_size))
         self._time = np.zeros(count, int)  # steps of the episode
 
     def _make_pipeline(self, obstacles: int) -> Pipeline:
-        settings, count, space = self._settings, self.count, self._task.adapter.space
+        settings, count, ranges = self._settings, self.count, self._settings.sensors
         batch = self._task.adapter.make_batch(settings, count, obstacles, self._threads)
         adapter = self._task.adapter(settings, batch.layout)
         observer = Observer(adapter, self._task)
-        ranges = settings.sensors
-        sensors = SensorModel(ranges, count, space, adapter.actions, observer.delayed) if ranges else None
-        return Pipeline(batch, adapter, observer, sensors)
+        estimator = ForceEstimator(adapter, count, self._threads, learns=ranges is not None)
+        space, cables = adapter.space, batch.cables
+        sensors = SensorModel(count, space, cables, adapter.actions, observer.delayed) if ranges else None
+        return Pipeline(batch, adapter, observer, estimator, sensors)
 
     def _pipeline_for(self, obstacles: int) -> Pipeline:
         """Return the present pipeline, or a new one for another number of obstacles."""
@@ -137,7 +145,7 @@ class EpisodeBatch:
 
     def _use(self, pipeline: Pipeline) -> None:
         self._pipeline = pipeline
-        self.batch, self.adapter, self.observer, self._sensors = pipeline
+        self.batch, self.adapter, self.observer, self._estimator, self._sensors = pipeline
         self._layout = self.batch.layout
 
     @property
@@ -151,15 +159,17 @@ class EpisodeBatch:
         Raises:
             RuntimeError: As :func:`ccr_gym.sampling.sample_feasible`; episodes and generators remain as they were.
         """
-        task, settings = self._task, self._settings
         with _restored_on_error(generators):
-            forces, assignments = sample_feasible(
-                task, self._trial_batch, robots, generators, settings.cable_limit_mm, settings.split
-            )
-        self._use(self._pipeline_for(task.obstacles))
+            imperfections = [self._sample_imperfections(generator) for generator in generators]
+            forces, assignments = self._trials.sample_feasible(robots, generators, imperfections)
+        self._use(self._pipeline_for(self._task.obstacles))
         for robot, assignment in zip(robots, assignments, strict=True):
             self.batch.assign(robot, assignment.scene)
-        self._start(robots, forces, assignments, generators)
+        self._start(robots, forces, assignments, imperfections)
+
+    def _sample_imperfections(self, generator: np.random.Generator) -> Imperfections | None:
+        ranges = self._settings.sensors
+        return sample_imperfections(ranges, self._settings.scales, self.adapter.space, generator) if ranges else None
 
     def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
         """Start a given episode of a robot; its generator samples the imperfections.
@@ -173,14 +183,15 @@ class EpisodeBatch:
         pipeline = self._pipeline_for(obstacles)
         pipeline.batch.assign(robot, assignment.scene)
         self._use(pipeline)
-        self._start([robot], np.atleast_2d(assignment.desired_force), [assignment], [generator])
+        imperfections = [self._sample_imperfections(generator)]
+        self._start([robot], np.atleast_2d(assignment.desired_force), [assignment], imperfections)
 
     def _start(
         self,
         robots: Sequence[int],
         forces: np.ndarray,
         assignments: Sequence[Assignment],
-        generators: Sequence[np.random.Generator],
+        imperfections: Sequence[Imperfections | None],
     ) -> None:
         """Start episodes of robots that are among their obstacles, with set-points ``(k, 1)`` or ``(k, d)`` [N]."""
         self._desired_n[robots] = forces[:, 0]
@@ -188,51 +199,67 @@ class EpisodeBatch:
             self._goal_n[robots] = forces
             self._desired_n[robots] = norm(forces)
         self.batch.rest(robots)
+        self._estimator.rest(robots)
         self._last_actions[robots], self._time[robots] = 0.0, 0
-        for robot, assignment, generator in zip(robots, assignments, generators, strict=True):
+        self._actuated_mm[robots] = self.adapter.actuated_mm(self.batch.blocks[robots], self._actuated_mm[robots] * 0.0)
+        for robot, assignment, sampled in zip(robots, assignments, imperfections, strict=True):
             if self._profiles is not None:
                 self._profiles[robot] = 1.0 if assignment.profile is None else assignment.profile
-            if self._sensors is not None:
-                actuated_mm = self.batch.blocks[robot, self.adapter.actuated_columns]
-                self._sensors.begin_episode(robot, generator, actuated_mm)
+            if self._sensors is not None and sampled is not None:
+                self._sensors.begin_episode(robot, sampled, self._actuated_mm[robot])
             if self.adapter.obstacle_size:
                 self._obstacle_features[robot] = self.adapter.obstacle_features(assignment.scene)
 
-    def step(self, actions: Quantity, index: EnvIndex = ALL) -> None:
+    def step(self, actions: np.ndarray, index: EnvIndex = ALL) -> None:
         """Move the actuated coordinates of some robots by increments.
 
         Args:
-            actions: Their actions, as :meth:`ccr_gym.adapters.RobotAdapter.clip` returns them.
+            actions: Their actions, as :meth:`ccr_gym.adapters.RobotAdapter.clip` returns them, ``(..., actions)``.
             index: The robots.
         """
-        adapter, batch = self.adapter, self.batch
-        if self._sensors is None:
-            command = adapter.command(batch.blocks, actions, index)
+        adapter, batch, sensors = self.adapter, self.batch, self._sensors
+        increment_mm = actions * adapter.actions.increment_mm
+        if sensors is None:
+            commanded = adapter.bounded(self._actuated_mm[index] + increment_mm)
         else:
-            actuated_mm = batch.blocks[index, adapter.actuated_columns]
-            command = self._sensors.apply_backlash(actuated_mm, actions * adapter.actions.increment_mm, index)
-        batch.commands[index, adapter.command_columns] = command
+            commanded = sensors.apply_backlash(self._actuated_mm[index], increment_mm, index)
+            before = self._layout.cables(batch.blocks[index]).copy()
+        adapter.write_command(batch.commands, commanded, index)
         self._last_actions[index] = actions
         self._time[index] += 1
         batch.move(index)
+        blocks = batch.blocks[index]
+        self._actuated_mm[index] = adapter.actuated_mm(blocks, commanded)
+        if sensors is not None:
+            sensors.move_cables(before, self._layout.cables(blocks), index)
+        self._estimate(index)
+
+    def _estimate(self, index: EnvIndex) -> None:
+        """Estimate the forces of robots that have moved."""
+        robots = np.atleast_1d(np.arange(self.count)[index])
+        blocks = self.batch.blocks[robots]
+        tensions, onsets, encoders = self._layout.tensions(blocks), self._layout.onset(blocks), self._actuated_mm
+        if self._sensors is not None:
+            tensions, onsets = (self._sensors.motor_tensions(entry, robots) for entry in (tensions, onsets))
+            encoders = self._sensors.motor_mm(ALL)
+        self._estimator.update(robots, Measured(blocks, encoders[robots], tensions, onsets))
 
     def read(self, index: int | slice = ALL) -> ForceReading:
         """Return the present contact forces."""
-        blocks = self.batch.blocks[index]
-        force_true = self._forces(blocks).copy()
-        force_est = self.adapter.estimate(blocks, force_true, index)
-        if self._sensors is not None:
-            rigidity_ratio = np.asarray(self._sensors.rigidity_ratio[index])[..., None]
-            force_true *= rigidity_ratio
-            force_est *= rigidity_ratio * np.asarray(self._sensors.measured_load_fraction[index])[..., None]
-        force = as_scalar(norm(force_true), index)
+        blocks, estimator = self.batch.blocks[index], self._estimator
+        nominal = self._forces(blocks)
+        estimates = [np.asarray(factors[index])[..., None] * nominal for factors in (estimator.chosen, estimator.paper)]
+        ratio = 1.0 if self._sensors is None else np.asarray(self._sensors.rigidity_ratio[index])[..., None]
+        force_true = ratio * nominal
+        regulated = force_true if self._settings.regulate == "true" else estimates[0]
+        force = as_scalar(norm(regulated), index)
         desired = self._desired(0, index)
         if self._vector:
             goal = self._goal_n[index].copy()
-            error = as_scalar(norm(goal - force_true), index) / desired
+            error = as_scalar(norm(goal - regulated), index) / desired
         else:
             goal, error = desired, abs(force - desired) / desired
-        return ForceReading(blocks, force_true, force_est, force, desired, goal, error)
+        return ForceReading(blocks, force_true, *estimates, regulated, force, desired, goal, error)
 
     def _forces(self, blocks: np.ndarray) -> np.ndarray:
         """Return the regulated contact force of robots of nominal rigidity, ``(..., d)`` [N]."""
@@ -252,7 +279,9 @@ class EpisodeBatch:
         inputs = {"desired_force": reading.goal, "force_est": reading.force_est}
         if self._profiles is not None:
             inputs["desired_ahead"] = np.stack([self._desired(steps, index) for steps in AHEAD], axis=-1)
-        measured, force = reading.force_true, reading.force
+        measured, force = reading.regulated, reading.force
+        if self._settings.regulate == "estimate":
+            inputs["force_measured"] = measured
         if self._sensors is not None:
             measured = inputs["force_measured"] = measured + self._sensors.force_error(self._time, index)
             force = as_scalar(norm(measured), index)
@@ -260,14 +289,17 @@ class EpisodeBatch:
         rows = self.observer.rows(reading.blocks, inputs, self._obstacle_features[index])
         if self._sensors is not None:
             rows = self._sensors.apply_latency(rows, self._time, index)
-            self.observer.write_encoders(rows, self._sensors.motor_mm(index))
+        self.observer.write_encoders(rows, self._encoders(index))
         return self.observer.clip(rows)
+
+    def _encoders(self, index: EnvIndex) -> np.ndarray:
+        """Return the actuated coordinates that the encoders of the motors read, ``(..., actions)`` [mm]."""
+        return np.asarray(self._actuated_mm[index] if self._sensors is None else self._sensors.motor_mm(index))
 
     def rewards(self, reading: ForceReading, index: int | slice = ALL) -> tuple[Quantity, ...]:
         """Return the reward terms of the last step."""
-        clearance = as_scalar(reading.blocks[..., self.adapter.clearance_column], index)
-        actions = self._last_actions[index]
-        effort = self.adapter.mean_square(as_scalar(actions, index) if self._last_actions.ndim == 1 else actions)
+        clearance = as_scalar(self._layout.clearance(reading.blocks)[..., 0], index) / self.adapter.scales.length_mm
+        effort = as_scalar(self.adapter.mean_square(self._last_actions[index]), index)
         weights, force, desired = self._settings.weights, reading.force, reading.desired
         return reward_terms(weights, force, desired, reading.error, clearance, effort, operations(index))
 
@@ -278,20 +310,22 @@ class EpisodeBatch:
         return {
             "force_true": reading.force_true,
             "force_est": reading.force_est,
+            "force_est_paper": reading.force_paper,
             "desired_force": reading.goal,
             **self.adapter.info(reading.blocks, index),
             "solver_status": as_scalar(self.batch.statuses[index], index),
-            "cost": operations(index).maximum(0.0, reading.force - self._settings.force_limit),
+            "cost": operations(index).maximum(
+                0.0, as_scalar(norm(reading.force_true), index) - self._settings.force_limit
+            ),
             "is_success": reading.error <= SUCCESS_ERROR,
-            "reward_terms": dict(zip(TERMS, terms, strict=True)),
+            **{f"reward_{name}": term for name, term in zip(TERMS, terms, strict=True)},
         }
 
     def privileged_state(self, index: int | slice = ALL) -> PrivilegedState:
         """Return the hidden state."""
-        sensors, force = self._sensors, self.read(index).force_true
+        sensors, force = self._sensors, self.read(index).regulated
         goal = self._goal_n[index].copy() if self._vector else self._desired(1, index)
-        actuated = self.batch.blocks[index, self.adapter.actuated_columns]
-        actuated = np.reshape(actuated, (*force.shape[:-1], self.actions.size)).copy()
+        actuated = self._actuated_mm[index].copy()
         if sensors is None:
             nominal = as_scalar(np.ones(self.count)[index], index)
             return PrivilegedState(force, nominal, goal, actuated, actuated, np.zeros(actuated.shape))
@@ -308,9 +342,8 @@ class EpisodeBatch:
         Returns:
             Regulated contact forces, ``(N, d)`` [N].
         """
-        commands, columns = self.batch.commands.copy(), self.adapter.command_columns
-        clipped = np.clip(actuated_mm, self.actions.low_mm, self.actions.high_mm)
-        commands[:, columns] = clipped.reshape(commands[:, columns].shape)
+        commands = self.batch.commands.copy()
+        self.adapter.write_command(commands, self.adapter.bounded(actuated_mm), ALL)
         forces = self._forces(self.batch.probe(commands))
         return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
 

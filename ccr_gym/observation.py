@@ -7,13 +7,13 @@ from gymnasium import spaces
 
 from ccr_gym.adapters import AnyAdapter, Feature, Features
 from ccr_gym.quantities import Quantity
-from ccr_gym.scales import AHEAD, FORCE_SCALE_N
+from ccr_gym.scales import AHEAD, FORCE_SPAN
 from ccr_gym.sensing import DELAYED_KEYS
 from ccr_gym.tasks import AnyTask
 
 SENSOR_KEYS = ("force_error", "force_measured")  # absent without a force sensor
 NOT_NEGATIVE = ("length", "desired_ahead", "contact")
-ENCODER_KEYS = ("cable", "length")  # in the order of the actions
+ENCODER_KEYS = ("cable", "length")  # what the encoders read, in the order of the actions
 
 
 class Observer:
@@ -56,8 +56,9 @@ class Observer:
         self.delayed = np.zeros(self._low.size, bool)
         for key in DELAYED_KEYS:
             self.delayed[self._columns.get(key, slice(0))] = True
-        self._obstacle_scale = np.ones(adapter.obstacle_size)
-        self._obstacle_scale[:3] = 1 / adapter.settings.robot.length_mm
+        self._force_n = FORCE_SPAN * adapter.scales.force_n
+        most = np.maximum(np.abs(adapter.actions.low_mm), adapter.actions.high_mm)
+        self._encoder_scale = 1 / most
 
     def rows(self, blocks: np.ndarray, forces: Mapping[str, Quantity], obstacle: np.ndarray) -> np.ndarray:
         """Return flat observations before they are clipped, ``(k,)`` for one robot, ``(N, k)`` for many.
@@ -73,18 +74,18 @@ class Observer:
         for key, force in forces.items():
             columns = self._input_columns.get(key)
             if columns is not None:  # one row is written faster without an ellipsis
-                rows[columns if one else (..., columns)] = force / FORCE_SCALE_N
+                rows[columns if one else (..., columns)] = force / self._force_n
         if "obstacle" in self._input_columns:
-            rows[..., self._input_columns["obstacle"]] = obstacle * self._obstacle_scale
+            rows[..., self._input_columns["obstacle"]] = obstacle
         return rows
 
     def write_encoders(self, rows: np.ndarray, motor_mm: np.ndarray) -> None:
-        """Replace actuated coordinates by motor encoder readings, ``(..., actions)`` [mm]."""
-        start = 0
+        """Write what the encoders of the motors read, ``(..., actions)`` [mm]."""
+        start, scaled = 0, motor_mm * self._encoder_scale
         for key in ENCODER_KEYS:
             if (columns := self._columns.get(key)) is not None:
                 count = columns.stop - columns.start
-                rows[..., columns] = motor_mm[..., start : start + count] * self._scale[columns]
+                rows[..., columns] = scaled[..., start : start + count]
                 start += count
 
     def clip(self, rows: np.ndarray) -> np.ndarray:
@@ -92,6 +93,11 @@ class Observer:
         np.maximum(rows, self._low, out=rows)
         np.minimum(rows, self._high, out=rows)
         return rows.astype(np.float32)
+
+    @property
+    def slices(self) -> dict[str, slice]:
+        """Columns of the named entries."""
+        return dict(self._columns)
 
     def entries(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Return the named entries of flat observations ``(..., k)``, as views."""
@@ -103,9 +109,8 @@ def _features(adapter: AnyAdapter, task: AnyTask) -> Features:
     layout, columns = adapter.layout, np.arange(adapter.layout.size)
     force = layout.force(columns) if task.target is None else layout.forces(columns)[task.target]
     return {
-        "cable": Feature(layout.cables(columns), 1 / adapter.settings.cable_limit_mm),
         "contact": Feature(layout.flags(columns), 1.0),
-        "force_measured": Feature(force, 1 / FORCE_SCALE_N),
+        "force_measured": Feature(force, 1 / (FORCE_SPAN * adapter.scales.force_n)),
         **adapter.pose_features(),
     }
 
@@ -114,10 +119,13 @@ def _input_sizes(adapter: AnyAdapter, task: AnyTask) -> dict[str, int]:
     """Return the sizes of the entries that are computed outside of the equilibrium block."""
     set_point = adapter.space if task.force_vector else 1
     sizes = {"desired_force": set_point, "force_error": set_point, "force_est": adapter.space}
+    sizes["cable"] = adapter.actions.commands
+    if adapter.actions.size > adapter.actions.commands:
+        sizes["length"] = 1
     if task.moving:
         sizes["desired_ahead"] = len(AHEAD)
-    if adapter.settings.sensors:
-        sizes["force_measured"] = adapter.space  # with noise, so not the block's
+    if adapter.settings.sensors or adapter.settings.regulate == "estimate":
+        sizes["force_measured"] = adapter.space  # with noise or estimated, so not the block's
     if adapter.obstacle_size:
         sizes["obstacle"] = adapter.obstacle_size
     return sizes
@@ -125,7 +133,7 @@ def _input_sizes(adapter: AnyAdapter, task: AnyTask) -> dict[str, int]:
 
 def _lowest(key: str, size: int, adapter: AnyAdapter) -> float:
     """Return the lower bound of an entry: 0 for what cannot be negative, otherwise −1."""
-    not_negative = key in NOT_NEGATIVE or (key == "cable" and adapter.space == 2)
+    not_negative = key in NOT_NEGATIVE or (key == "cable" and (adapter.actuation.low >= 0).all())
     return 0.0 if not_negative or (key == "desired_force" and size == 1) else -1.0
 
 

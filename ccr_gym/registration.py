@@ -14,14 +14,20 @@ from ccr_gym.envs import (
 )
 from ccr_gym.vector_env import make_vector_env
 
+PAPER = {"model": "paper", "estimator": "paper", "regulate": "estimate"}  # the paper's system to the letter
+TASK_ENVS: tuple[type[TaskEnv], ...] = (
+    LoadCellEnv,
+    PushObstacleEnv,
+    TrackForceEnv,
+    BracedPushEnv,
+    SoftObstacleEnv,
+    InsertAndPushEnv,
+    SpatialPushEnv,
+)
+PAPER_ENVS: tuple[type[TaskEnv], ...] = (LoadCellEnv, PushObstacleEnv, SpatialPushEnv)
 ENV_IDS: dict[str, type[TaskEnv]] = {
-    "CCR/LoadCell-v0": LoadCellEnv,
-    "CCR/PushObstacle-v0": PushObstacleEnv,
-    "CCR/TrackForce-v0": TrackForceEnv,
-    "CCR/BracedPush-v0": BracedPushEnv,
-    "CCR/SoftObstacle-v0": SoftObstacleEnv,
-    "CCR/InsertAndPush-v0": InsertAndPushEnv,
-    "CCR/SpatialPush-v0": SpatialPushEnv,
+    **{f"CCR/{env.task_class.__name__}-v1": env for env in TASK_ENVS},
+    **{f"CCR/{env.task_class.__name__}-Paper-v1": env for env in PAPER_ENVS},
 }
 
 
@@ -34,5 +40,5 @@ def register_envs() -> None:
                 entry_point=f"{env_class.__module__}:{env_class.__name__}",
                 vector_entry_point=f"{make_vector_env.__module__}:{make_vector_env.__name__}",
                 max_episode_steps=env_class.task_class.steps,
-                kwargs={"task_name": env_class.task_class.__name__},
+                kwargs={"task_name": env_class.task_class.__name__, **(PAPER if "-Paper-" in env_id else {})},
             )

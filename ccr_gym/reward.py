@@ -10,7 +10,7 @@ from solver.common.operations import Operations
 
 MAX_WEIGHT = 1e6
 ACCURACY_RATE = 20.0  # of the decay of ``accuracy``, per relative force error
-CLEARANCE_SCALE_MM = 100.0  # of ``approach``
+CLEARANCE_SPAN = 5 / 9  # of ``approach`` [L]
 SUCCESS_ERROR = 0.05  # relative force error up to which a step is a success
 
 
@@ -22,7 +22,7 @@ class RewardWeights:
         force_error: Relative force error ``|F − F_d| / F_d``, of magnitudes or vectors, counted up to 1.
         accuracy: Nearness to the set-point, ``exp(−20 |F − F_d| / F_d)``, in [0, 1].
         overshoot: Relative force above the set-point, counted up to 1.
-        approach: Clearance per 100 mm while nothing touches, counted up to 1.
+        approach: Clearance over 5/9 of the robot's length while nothing touches, counted up to 1.
         effort: Mean square of the action.
 
     Raises:
@@ -58,7 +58,7 @@ def reward_terms(
         force: Magnitude of the contact force, zero without contact [N].
         desired: Magnitude of the desired force [N].
         error: Relative force error.
-        clearance: Smallest gap [mm].
+        clearance: Smallest gap over the robot's length.
         effort: Mean square of the action.
         operations: Operations on numbers or on arrays, as the quantities are.
     """
@@ -68,6 +68,6 @@ def reward_terms(
         -weights.force_error * minimum(error, 1.0),
         weights.accuracy * np.exp(-ACCURACY_RATE * error),
         -weights.overshoot * minimum(maximum(excess, 0.0), 1.0),
-        -weights.approach * where(force > 0, 0.0, minimum(maximum(clearance, 0.0) / CLEARANCE_SCALE_MM, 1.0)),
+        -weights.approach * where(force > 0, 0.0, minimum(maximum(clearance, 0.0) / CLEARANCE_SPAN, 1.0)),
         -weights.effort * effort,
     )

@@ -1,71 +1,168 @@
-"""Sampling of feasible episodes: scenes that leave the straight robot clear, with set-points that it can reach."""
+"""Sampling of feasible episodes: scenes that leave the straight robot clear, with set-points that it can hold."""
 
 import zlib
 from collections.abc import Sequence
 
 import numpy as np
 
+from ccr_gym.adapters import AnyAdapter
 from ccr_gym.checks import check_array, check_type, refusal
-from ccr_gym.scales import FORCE_SCALE_N
+from ccr_gym.estimation import ForceEstimator, Measured
+from ccr_gym.quantities import norm
+from ccr_gym.scales import FORCE_SPAN, Scales
+from ccr_gym.sensing import Imperfections
+from ccr_gym.settings import AnySettings
 from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment, check_force
-from solver import Scene
-from solver.common.batch import BaseBatch
+from solver import Scene, Status
 from solver.common.checks import check_core
 from solver.common.robot import AnyRobot
 
 MAX_SAMPLES = 1000
-RAMP_INCREMENT_MM = 0.5  # cable displacement between the equilibria of a ramp
+PULL = 1 / 16  # cable displacement between the equilibria of a trial pull, of all sections together [a]
+MARGIN = 1.1  # force that a trial pull must reach, over the set-point
 TEST_SHARE = 5  # one scene of this many is a test scene
+HASHED = 8  # uniform numbers from which a scene is sampled that say which split it belongs to
 
 
-def sample_feasible(
-    task: AnyTask,
-    batch: BaseBatch,
-    robots: Sequence[int],
-    generators: Sequence[np.random.Generator],
-    cable_limit_mm: float,
-    split: str = "all",
-) -> tuple[np.ndarray, list[Assignment]]:
-    """Return a feasible assignment for each of some robots, sampled by a generator of its own.
-
-    An assignment is feasible if its obstacles leave the straight robot clear and pulling the cables steadily reaches
-    the set-point without a stall, block or snap. Infeasible ones are sampled again.
+class Trials:
+    """Trial pulls of N robots, which tell whether an episode can be played.
 
     Args:
         task: The task that samples.
-        batch: Robots to try scenes with; those named are left in theirs.
-        robots: Indices of k robots in the batch.
-        generators: One generator for each of them.
-        cable_limit_mm: Largest cable displacement of the ramp [mm].
-        split: ``"all"``, ``"train"`` or ``"test"`` scenes.
-
-    Returns:
-        Set-points ``(k, 1)``, or ``(k, d)`` where they are vectors [N], and the assignments.
-
-    Raises:
-        RuntimeError: If none of many samples is feasible: the task does not suit the robot.
-        TypeError: If the task samples something other than an :class:`Assignment`.
-        ValueError: If it samples an invalid scene or set-point.
+        settings: Settings of the environment.
+        count: Number N of robots.
+        threads: Threads of the solver.
     """
-    desired = np.zeros((len(robots), task.adapter.space if task.force_vector else 1))
-    assignments: dict[int, Assignment] = {}
-    waiting = list(range(len(robots)))
-    for _ in range(MAX_SAMPLES):
-        sampled = {k: _sample_split(task, batch.robot, generators[k], split) for k in waiting}
-        clear = [k for k in waiting if _place(batch, robots[k], sampled[k].scene)]
-        if not clear:
-            continue
-        found, forces = _ramp(task, batch, [robots[k] for k in clear], [sampled[k] for k in clear], cable_limit_mm)
-        desired[clear] = forces
-        assignments |= {k: sampled[k] for k in clear}
-        done = {k for k, success in zip(clear, found, strict=True) if success}
-        waiting = [k for k in waiting if k not in done]
-        if not waiting:
-            return desired, [assignments[k] for k in range(len(robots))]
-    raise RuntimeError(
-        f"none of {MAX_SAMPLES} samples of {task} can be pushed as desired within {cable_limit_mm} mm of cable; "
-        "widen the task's ranges or the cable limit"
-    )
+
+    def __init__(self, task: AnyTask, settings: AnySettings, count: int, threads: int) -> None:
+        self._task, self._settings = task, settings
+        self._batch = task.adapter.make_batch(settings, count, task.obstacles, threads)
+        self._adapter: AnyAdapter = task.adapter(settings, self._batch.layout)
+        self._estimator = None
+        if settings.regulate == "estimate":
+            self._estimator = ForceEstimator(self._adapter, count, threads, learns=False)
+
+    def sample_feasible(
+        self,
+        robots: Sequence[int],
+        generators: Sequence[np.random.Generator],
+        imperfections: Sequence[Imperfections | None],
+    ) -> tuple[np.ndarray, list[Assignment]]:
+        """Return a feasible assignment for each of some robots, sampled by a generator of its own.
+
+        An assignment is feasible if its obstacles leave the straight robot clear and pulling the cables steadily
+        reaches the set-point, with a margin, without a stall, block or snap. Infeasible ones are sampled again.
+
+        Args:
+            robots: Indices of k robots.
+            generators: One generator for each of them.
+            imperfections: Imperfections of their episodes, whose rigidity and play limit what can be reached.
+
+        Returns:
+            Set-points ``(k, 1)``, or ``(k, d)`` where they are vectors [N], and the assignments.
+
+        Raises:
+            RuntimeError: If none of many samples is feasible: the task does not suit the robot.
+            TypeError: If the task samples something other than an :class:`Assignment`.
+            ValueError: If it samples an invalid scene or set-point.
+        """
+        desired = np.zeros((len(robots), self._adapter.space if self._task.force_vector else 1))
+        assignments: dict[int, Assignment] = {}
+        waiting = list(range(len(robots)))
+        for _ in range(MAX_SAMPLES):
+            sampled = {k: _sample_split(self._task, self._batch.robot, generators[k], self._split) for k in waiting}
+            clear = [k for k in waiting if self._place(robots[k], sampled[k].scene)]
+            if not clear:
+                continue
+            found, forces = self._pull(
+                [robots[k] for k in clear], [sampled[k] for k in clear], [imperfections[k] for k in clear]
+            )
+            desired[clear] = forces
+            assignments |= {k: sampled[k] for k in clear}
+            done = {k for k, success in zip(clear, found, strict=True) if success}
+            waiting = [k for k in waiting if k not in done]
+            if not waiting:
+                return desired, [assignments[k] for k in range(len(robots))]
+        raise RuntimeError(
+            f"none of {MAX_SAMPLES} samples of {self._task} can be pushed as desired within {self._limit_mm:.6g} mm of "
+            "cable; widen the task's ranges or the cable limit"
+        )
+
+    @property
+    def _split(self) -> str:
+        return self._settings.split
+
+    @property
+    def _limit_mm(self) -> float:
+        """Largest cable displacement, of all sections together, that is reached whatever the play [mm]."""
+        actuation, sensors = self._adapter.actuation, self._settings.sensors
+        play = 0.0 if sensors is None else sensors.backlash[1] * self._adapter.scales.travel_mm
+        return max(self._settings.cable_limit_mm - play, 0.5 * self._settings.cable_limit_mm) * actuation.sections
+
+    def _place(self, robot: int, scene: Scene) -> bool:
+        """Put a robot among obstacles if they leave it clear, and return whether they do."""
+        clear = self._batch.leaves_clear(scene)
+        if clear:
+            self._batch.assign(robot, scene)
+        return clear
+
+    def _pull(
+        self, robots: list[int], assignments: list[Assignment], imperfections: list[Imperfections | None]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return whether trial pulls reach the set-points, ``(k,)`` bool, and the set-points, as sampled or reached."""
+        forces = np.array([assignment.desired_force for assignment in assignments], float)
+        ratio = np.array([1.0 if entry is None else entry.rigidity_ratio for entry in imperfections])
+        bending = np.array([assignment.direction for assignment in assignments], float)
+        pulls = self._adapter.actuation.cables_mm(self._adapter.actuation.steady(bending))
+        wanted, limit = forces * MARGIN / ratio, self._limit_mm
+        if self._estimator is not None:
+            found, reached = self._pull_by_estimate(robots, wanted, limit, bending)
+        else:
+            increment = PULL * self._adapter.scales.travel_mm
+            found, reached = self._batch.ramp_reaches_force(
+                robots, wanted, increment, limit, pulls, self._task.target
+            )
+        if not self._task.force_vector:
+            return found, forces[:, None]
+        goals = reached * (ratio / MARGIN)[:, None]
+        return found & (norm(goals) <= FORCE_SPAN * self._adapter.scales.force_n), goals
+
+    def _pull_by_estimate(
+        self, robots: list[int], wanted: np.ndarray, limit: float, bending: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return whether steady pulls bring the estimated forces to those wanted, and the forces they reach."""
+        batch, adapter, estimator = self._batch, self._adapter, self._estimator
+        assert estimator is not None
+        batch.rest(robots)
+        estimator.rest(robots)
+        rows, pulled = np.array(robots), 0.0
+        found, reached = np.zeros(len(rows), bool), np.zeros((len(rows), adapter.space))
+        going = np.ones(len(rows), bool)
+        while going.any() and pulled < limit:
+            pulled = min(pulled + PULL * adapter.scales.travel_mm, limit)
+            moving = rows[going].tolist()
+            actuated = adapter.bounded(self._actuated(pulled * adapter.actuation.steady(bending[going])))
+            adapter.write_command(batch.commands, actuated, moving)
+            batch.move(moving)
+            blocks = batch.blocks[moving]
+            tensions, onsets = adapter.layout.tensions(blocks), adapter.layout.onset(blocks)
+            estimator.update(moving, Measured(blocks, actuated, tensions, onsets))
+            forces = estimator.chosen[moving, None] * self._regulated(blocks)
+            reached[going] = forces
+            held = (norm(forces) >= wanted[going]) & (batch.statuses[moving] == Status.CONVERGED)
+            ended = held | (batch.statuses[moving] != Status.CONVERGED)
+            found[going] = held
+            going[going] = ~ended
+        return found, reached
+
+    def _actuated(self, commands: np.ndarray) -> np.ndarray:
+        """Return actuated coordinates with these commands, at the length at rest, ``(k, actions)`` [mm]."""
+        spare = self._adapter.actions.size - commands.shape[1]
+        return np.pad(commands, ((0, 0), (0, spare)), constant_values=self._batch.robot.length_mm)
+
+    def _regulated(self, blocks: np.ndarray) -> np.ndarray:
+        layout, target = self._adapter.layout, self._task.target
+        return layout.force(blocks) if target is None else layout.forces(blocks)[..., target, :]
 
 
 def check_robot(task: AnyTask, robot: AnyRobot) -> None:
@@ -75,55 +172,42 @@ def check_robot(task: AnyTask, robot: AnyRobot) -> None:
         ValueError: Naming the task, the obstacle, its width and what the robot needs.
     """
     try:
-        for scene in task.narrowest_scenes():
+        for scene in task.narrowest_scenes(robot):
             check_core(robot, scene)
     except ValueError as error:
         raise ValueError(f"the narrowest obstacles of {task} are refused: {error}") from error
 
 
-def in_test_split(scene: Scene) -> bool:
-    """Return whether a scene is a test scene; the parameters of its obstacles assign a fixed fifth of all scenes."""
-    return zlib.crc32(np.array(scene.parameters).tobytes()) % TEST_SHARE == 0
-
-
-def _place(batch: BaseBatch, robot: int, scene: Scene) -> bool:
-    """Put a robot among obstacles if they leave it clear, and return whether they do."""
-    clear = batch.leaves_clear(scene)
-    if clear:
-        batch.assign(robot, scene)
-    return clear
-
-
-def _ramp(
-    task: AnyTask, batch: BaseBatch, robots: list[int], assignments: list[Assignment], cable_limit_mm: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return whether ramps reach the set-points, ``(k,)`` bool, and the set-points, ``(k, 1)`` or ``(k, d)`` [N]."""
-    forces = np.array([assignment.desired_force for assignment in assignments], float)
-    pulls = np.array([assignment.pull for assignment in assignments])
-    found, reached = batch.ramp_reaches_force(robots, forces, RAMP_INCREMENT_MM, cable_limit_mm, pulls, task.target)
-    if not task.force_vector:
-        return found, forces[:, None]
-    return found & (np.linalg.norm(reached, axis=1) <= FORCE_SCALE_N), reached
-
-
 def _sample_split(task: AnyTask, robot: AnyRobot, generator: np.random.Generator, split: str) -> Assignment:
     """Return the next assignment whose scene is of a split."""
     for _ in range(MAX_SAMPLES):
+        wanted = split == "all" or is_test_draw(generator) == (split == "test")
         sampled = task.sample(robot, generator)
-        _check_sample(task, sampled)
-        if split == "all" or in_test_split(sampled.scene) == (split == "test"):
+        _check_sample(task, robot, sampled)
+        if wanted:
             return sampled
     raise RuntimeError(f"none of {MAX_SAMPLES} samples of {task} is a {split} scene; widen the task's ranges")
 
 
-def _check_sample(task: AnyTask, sampled: Assignment) -> None:
+def is_test_draw(generator: np.random.Generator) -> bool:
+    """Return whether what a generator would sample next is a test scene, without drawing from it.
+
+    The uniform numbers that a scene is made of assign a fixed fifth of all scenes, for robots of any size.
+    """
+    state = generator.bit_generator.state
+    draws = generator.random(HASHED)
+    generator.bit_generator.state = state
+    return zlib.crc32(draws.tobytes()) % TEST_SHARE == 0
+
+
+def _check_sample(task: AnyTask, robot: AnyRobot, sampled: Assignment) -> None:
     """Raise an error if what a task, which may be a user's, has sampled is not a valid assignment."""
     check_type("what the task samples", sampled, Assignment, "an Assignment")
     check_type("sampled scene", sampled.scene, Scene)
     if len(sampled.scene) != task.obstacles:
         raise refusal("sampled scene", sampled.scene, f"a Scene of {task.obstacles} obstacles, as the task declares")
-    check_force("sampled desired_force", sampled.desired_force)
-    check_array("sampled pull", sampled.pull, (task.adapter.cables,))
+    check_force("sampled desired_force", sampled.desired_force, Scales.of(robot).force_n)
+    check_array("sampled direction", sampled.direction, (task.adapter.space - 1,))
     if sampled.profile is not None:
         profile = check_array("sampled profile", sampled.profile, (PROFILE_STEPS,))
         if not ((profile > 0).all() and (profile <= 1).all()):

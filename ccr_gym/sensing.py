@@ -1,16 +1,20 @@
 """The imperfections between robot and agent: motors with backlash, sensors with noise, bias and latency.
 
-Every episode samples its own when it begins, all of its noise included, from the generator of its environment.
+Every episode samples its own when it begins, all of its noise included, from the generator of its environment. Sizes
+are multiples of the robot's natural units (:class:`ccr_gym.scales.Scales`).
 """
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import check_fields, check_range, checked
 from ccr_gym.quantities import EnvIndex
+from ccr_gym.scales import Scales
+from solver import Transmission
 from solver.common.validation import SMALLEST
 
 Range = tuple[float, ...]
@@ -25,10 +29,11 @@ class Sensing:
 
     Attributes:
         latency: Delay of all observations but cable displacements and set-point [steps].
-        noise_n: Standard deviation of white noise on each component of the measured force [N].
-        bias_n: Magnitude of the constant error of each component of the measured force [N].
-        backlash_mm: Play between motor and cable: after a reversal the cable rests until it is taken up [mm].
-        tendon_loss: Share of the cable load lost to friction before it is measured, unknown to the estimator.
+        noise: Standard deviation of white noise on each component of the measured force [EI/L²].
+        bias: Magnitude of the constant error of each component of the measured force [EI/L²].
+        backlash: Play between motor and cable: after a reversal the cable rests until it is taken up [a].
+        tendon_loss: Share of the tension that friction takes between motor and robot, against the motion, as in
+            :class:`solver.Transmission`; unknown to the estimator.
         rigidity_ratio: Rigidity of the robot over its nominal value; it scales forces and leaves shapes unchanged.
 
     Raises:
@@ -36,9 +41,9 @@ class Sensing:
     """
 
     latency: Range = checked((1, 4), check_range, whole=True, low=0, high=HISTORY - 1)
-    noise_n: Range = checked((0.0005, 0.0015), check_range, low=0)
-    bias_n: Range = checked((0.0, 0.003), check_range, low=0)
-    backlash_mm: Range = checked((0.2, 0.6), check_range, low=0)
+    noise: Range = checked((0.01, 0.03), check_range, low=0)
+    bias: Range = checked((0.0, 0.06), check_range, low=0)
+    backlash: Range = checked((0.025, 0.075), check_range, low=0)
     tendon_loss: Range = checked((0.0, 0.3), check_range, low=0, high=0.9)
     rigidity_ratio: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
 
@@ -46,46 +51,93 @@ class Sensing:
         check_fields(self)
 
 
+class Imperfections(NamedTuple):
+    """The imperfections of one episode.
+
+    Attributes:
+        latency: Delay [steps].
+        backlash_mm: Play between motors and cables [mm].
+        tendon_loss: Share of the tension that is lost.
+        rigidity_ratio: Rigidity over its nominal value.
+        force_error_n: Error of the measured force at every step, bias and noise, ``(NOISE_STEPS, d)`` [N].
+    """
+
+    latency: int
+    backlash_mm: float
+    tendon_loss: float
+    rigidity_ratio: float
+    force_error_n: np.ndarray
+
+
+def sample_imperfections(
+    sensing: Sensing, scales: Scales, space: int, generator: np.random.Generator
+) -> Imperfections:
+    """Return the imperfections of an episode.
+
+    Args:
+        sensing: Ranges to sample from.
+        scales: Natural units of the robot.
+        space: Dimension d of the space.
+        generator: Generator of the environment.
+    """
+    latency, backlash, loss, rigidity, noise, *biases = generator.random(5 + space).tolist()
+    low, high = sensing.latency
+    bias = [_interpolate(sensing.bias, abs(2 * part - 1)) * math.copysign(1, part - 0.5) for part in biases]
+    white = generator.normal(size=(NOISE_STEPS, space))
+    return Imperfections(
+        low + int(latency * (high - low + 1)),
+        _interpolate(sensing.backlash, backlash) * scales.travel_mm,
+        _interpolate(sensing.tendon_loss, loss),
+        math.exp(_interpolate(tuple(map(math.log, sensing.rigidity_ratio)), rigidity)),
+        (bias + _interpolate(sensing.noise, noise) * white) * scales.force_n,
+    )
+
+
 class SensorModel:
     """Motors and sensors of many robots.
 
     Attributes:
         rigidity_ratio: Rigidity of each robot over its nominal value, ``(N,)``.
-        measured_load_fraction: Fraction of each cable load that is measured, ``(N,)``.
 
     Args:
-        sensing: Ranges to sample from.
         count: Number N of robots.
         space: Dimension d of the space.
+        cables: Number of cables.
         actions: The actuated coordinates.
         delayed: Which columns of an observation are delayed, ``(k,)`` bool.
     """
 
-    def __init__(self, sensing: Sensing, count: int, space: int, actions: ActionSpec, delayed: np.ndarray) -> None:
-        self._sensing, self._actions, self._delayed = sensing, actions, delayed
-        self._has_backlash = np.arange(actions.size) < actions.cables  # cables have, the insertion has none
+    def __init__(self, count: int, space: int, cables: int, actions: ActionSpec, delayed: np.ndarray) -> None:
+        self._actions, self._delayed = actions, delayed
+        self._has_backlash = np.arange(actions.size) < actions.commands  # cables have, the insertion has none
         self._latency = np.zeros(count, int)
         self._backlash_mm = np.zeros(count)
         self._noise = np.zeros((count, NOISE_STEPS, space))
         self._motor_mm = np.zeros((count, actions.size))
+        self._loss, self._moved_in = np.zeros(count), np.ones((count, cables), bool)
         self._history = np.zeros((count, HISTORY, delayed.size))
         self._history_empty = np.ones(count, bool)
-        self.rigidity_ratio, self.measured_load_fraction = np.ones(count), np.ones(count)
+        self.rigidity_ratio = np.ones(count)
 
-    def begin_episode(self, robot: int, generator: np.random.Generator, motor_mm: np.ndarray) -> None:
-        """Sample motors and sensors of a robot's next episode, which begins with the motors at these positions."""
-        sensing, space = self._sensing, self._noise.shape[2]
-        latency, backlash, loss, rigidity, noise, *biases = generator.random(5 + space).tolist()
-        low, high = sensing.latency
-        self._latency[robot] = low + int(latency * (high - low + 1))
-        self._backlash_mm[robot] = _interpolate(sensing.backlash_mm, backlash)
-        self.measured_load_fraction[robot] = 1 - _interpolate(sensing.tendon_loss, loss)
-        self.rigidity_ratio[robot] = math.exp(_interpolate(tuple(map(math.log, sensing.rigidity_ratio)), rigidity))
-        bias = [_interpolate(sensing.bias_n, abs(2 * part - 1)) * math.copysign(1, part - 0.5) for part in biases]
-        white = generator.normal(size=(NOISE_STEPS, space))
-        self._noise[robot] = bias + _interpolate(sensing.noise_n, noise) * white
-        self._motor_mm[robot] = motor_mm
+    def begin_episode(self, robot: int, sampled: Imperfections, motor_mm: np.ndarray) -> None:
+        """Begin a robot's next episode, with the motors at these positions."""
+        self._latency[robot], self._backlash_mm[robot] = sampled.latency, sampled.backlash_mm
+        self._loss[robot], self.rigidity_ratio[robot] = sampled.tendon_loss, sampled.rigidity_ratio
+        self._noise[robot] = sampled.force_error_n
+        self._motor_mm[robot], self._moved_in[robot] = motor_mm, True
         self._history_empty[robot] = True
+
+    def move_cables(self, before_mm: np.ndarray, after_mm: np.ndarray, index: EnvIndex) -> None:
+        """Note which way cables have moved, displacements ``(..., cables)`` [mm]."""
+        self._moved_in[index] = self._transmission(index).moved(before_mm, after_mm).moved_in
+
+    def motor_tensions(self, tensions: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return the tensions that the motors see for nominal ones in the robot, ``(..., cables)`` [N]."""
+        ratio = np.asarray(self.rigidity_ratio[index])[..., None]
+        return self._transmission(index).motor_tensions(ratio * tensions)
+
+    def _transmission(self, index: EnvIndex) -> Transmission:
+        return Transmission(np.asarray(self._loss[index]), self._moved_in[index])
 
     def apply_backlash(self, actuated_mm: np.ndarray, increment_mm: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Move the motors by increments, within bounds, and return where that leaves the actuated coordinates [mm].

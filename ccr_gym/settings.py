@@ -1,9 +1,9 @@
 """Settings of an environment, validated once."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import partial
-from typing import Generic, Literal, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Literal, TypeVar, cast
 
 from ccr_gym.checks import (
     check_choice,
@@ -12,18 +12,26 @@ from ccr_gym.checks import (
     check_instance,
     check_number,
     checked,
+    derived,
     nested,
     refusal,
     require,
 )
 from ccr_gym.reward import RewardWeights
+from ccr_gym.scales import Scales
 from ccr_gym.sensing import Sensing
-from solver import Robot
+from solver import PRESETS, Actuation, Cable, Robot
 from solver.common.validation import SMALLEST
 from solver.spatial import SpatialRobot
 
 RobotT = TypeVar("RobotT", bound=Robot | SpatialRobot)
 MAX_FRICTION = 10.0
+INCREMENT = 1 / 16  # cable displacement of a full action [a]
+CABLE_LIMIT = 1.75  # largest cable displacement, of all sections together [a]
+FORCE_LIMIT = 6.0  # contact force above which there is a cost [EI/L²]
+INSERTION = 1 / 180  # of a full action [L]
+INSERTED = 7 / 8, 9 / 8  # shortest and longest length [L]
+SURROUNDED = tuple(Cable(angle=quarter * math.pi / 2) for quarter in range(4))
 
 
 def check_sensing(name: str, value: object) -> str | Sensing:
@@ -41,18 +49,39 @@ def check_sensing(name: str, value: object) -> str | Sensing:
     return check_instance(name, value, kind=Sensing)
 
 
+def _check_robot(name: str, value: object, *, kind: type[Any]) -> object:
+    """Return a robot, the name of a preset, or the fields of a robot; which model it has is not settled yet."""
+    if value is None or isinstance(value, kind):
+        return value
+    if isinstance(value, str):
+        preset = value.replace("-", "_")
+        if preset not in PRESETS:
+            raise refusal(name, value, f"a {kind.__name__}, a mapping of its fields, or one of {', '.join(PRESETS)}")
+        return preset
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise refusal(name, value, f"a {kind.__name__}, a mapping of its fields, or the name of a preset", TypeError)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BaseSettings(Generic[RobotT]):
     """Settings that all environments share.
 
     Attributes:
-        robot: The robot, or a mapping of its fields; by default the paper's prototype, in its model.
-        obs_mode: Form of the observation: ``"dict"`` or ``"flat"``.
-        force_sensor: Whether the measured contact force is observed beside the virtual-work estimate.
-        max_increment_mm: Cable displacement of a full action [mm].
-        cable_limit_mm: Largest cable displacement that actions can command [mm].
-        estimator_friction: Ratio μ of the virtual-work estimator (eq. 11), from 0 to 10.
-        force_limit: Contact force above which ``info["cost"]`` is positive [N].
+        robot: The robot, the name of a preset (:data:`solver.PRESETS`), or a mapping of its fields; by default the
+            paper's prototype.
+        model: Model of a robot that is given by name, by its fields or not at all: ``"rod"``, or ``"paper"`` for the
+            paper's system to the letter.
+        obs_mode: Form of the observation: ``"flat"``, or ``"dict"`` for its named parts.
+        force_sensor: Whether the measured contact force is observed beside the estimate.
+        max_increment_mm: Cable displacement of a full action [mm]; ``None`` stands for a/16, shared by the sections.
+        cable_limit_mm: Largest cable displacement that actions can command [mm]; ``None`` stands for 1.75 a, shared by
+            the sections, or the robot's own limit if that is less.
+        estimator: Estimate of the contact force that is observed: ``"contact"``, virtual work at the point that
+            touches, or ``"paper"``, eq. 11.
+        estimator_friction: Ratio μ of eq. 11, from 0 to 10.
+        regulate: Force that is desired and rewarded: ``"true"``, or ``"estimate"``.
+        force_limit: Contact force above which ``info["cost"]`` is positive [N]; ``None`` stands for 6 EI/L².
         weights: Weights of the reward terms, or a mapping of names to weights.
         backend: ``"native"``, or ``"casadi"`` for the reference solver, which is slow.
         sensing: ``"ideal"``, ``"realistic"``, or a :class:`ccr_gym.Sensing` or mapping of its fields.
@@ -64,12 +93,15 @@ class BaseSettings(Generic[RobotT]):
     """
 
     robot: RobotT
-    obs_mode: Literal["dict", "flat"] = checked("dict", check_choice, choices=("dict", "flat"))
+    model: Literal["rod", "paper"] = checked("rod", check_choice, choices=("rod", "paper"))
+    obs_mode: Literal["dict", "flat"] = checked("flat", check_choice, choices=("dict", "flat"))
     force_sensor: bool = checked(True, check_flag)
-    max_increment_mm: float = checked(0.5, check_number, low=SMALLEST)
-    cable_limit_mm: float = checked(14.0, check_number, low=SMALLEST)
+    max_increment_mm: float = derived(check_number, low=SMALLEST)
+    cable_limit_mm: float = derived(check_number, low=SMALLEST)
+    estimator: Literal["contact", "paper"] = checked("contact", check_choice, choices=("contact", "paper"))
     estimator_friction: float = checked(0.0, check_number, low=0, high=MAX_FRICTION)
-    force_limit: float = checked(0.3, check_number, low=SMALLEST)
+    regulate: Literal["true", "estimate"] = checked("true", check_choice, choices=("true", "estimate"))
+    force_limit: float = derived(check_number, low=SMALLEST)
     weights: RewardWeights = nested(RewardWeights)
     backend: Literal["native", "casadi"] = checked("native", check_choice, choices=("native", "casadi"))
     sensing: str | Sensing = checked("ideal", check_sensing)
@@ -77,10 +109,17 @@ class BaseSettings(Generic[RobotT]):
 
     def __post_init__(self) -> None:
         check_fields(self)
+        self._assign(robot=self._make_robot())
+        scales, sections = self.scales, self.actuation.sections
+        limit = min(CABLE_LIMIT * scales.travel_mm, self.robot.cable_limit_mm) / sections
+        self._derive("cable_limit_mm", limit)
+        self._derive("max_increment_mm", min(INCREMENT * scales.travel_mm / sections, self.cable_limit_mm))
+        self._derive("force_limit", FORCE_LIMIT * scales.force_n)
+        most = self.robot.cable_limit_mm / sections
         require(
-            self.cable_limit_mm <= self.robot.cable_limit_mm,
-            f"cable_limit_mm is {self.cable_limit_mm}; it must be at most {self.robot.cable_limit_mm:.6g}, "
-            "the max_cable_mm of the robot",
+            self.cable_limit_mm <= most,
+            f"cable_limit_mm is {self.cable_limit_mm}; it must be at most {most:.6g}, the max_cable_mm of the robot"
+            + (f" over its {sections} sections" if sections > 1 else ""),
         )
         require(
             self.max_increment_mm <= self.cable_limit_mm,
@@ -89,52 +128,89 @@ class BaseSettings(Generic[RobotT]):
         )
 
     @property
+    def scales(self) -> Scales:
+        """Natural units of the robot."""
+        return Scales.of(self.robot)
+
+    @property
+    def actuation(self) -> Actuation:
+        """Map from actions to cables."""
+        return Actuation.of(self.robot, 2 if isinstance(self.robot, Robot) else 3)
+
+    @property
     def sensors(self) -> Sensing | None:
         """Ranges of the imperfections, or ``None`` where sensing is ideal."""
         if self.sensing == "realistic":
             return Sensing()
         return self.sensing if isinstance(self.sensing, Sensing) else None
 
+    def _make_robot(self) -> RobotT:
+        """Return the robot, which may be given by name, by its fields, or not at all."""
+        kind, given = self._robot_kind(), cast("object", self.robot)
+        if isinstance(given, kind):
+            return cast("RobotT", given)
+        if isinstance(given, str):
+            robot = self._preset(given)
+        elif given:
+            assert isinstance(given, dict)
+            robot = check_instance("robot", given, kind=kind, usual={"model": self.model})
+        else:
+            robot = self._preset("prototype")
+        return cast("RobotT", robot)
+
+    def _robot_kind(self) -> type[Any]:
+        raise NotImplementedError
+
+    def _preset(self, name: str) -> object:
+        """Return a robot by its name; in the paper's model it keeps its sizes, rigidity and tension limit."""
+        if self.model == "rod":
+            return self._robot_kind().preset(name)
+        row = PRESETS[name]
+        kept = ("length_mm", "segments", "offset_mm", "rigidity", "max_tension")
+        return self._robot_kind()(model="paper", **{field: getattr(row, field) for field in kept})
+
+    def _derive(self, name: str, value: float) -> None:
+        """Fill in a field that follows from the robot unless it is given."""
+        if getattr(self, name) is None:
+            self._assign(**{name: value})
+
+    def _assign(self, **values: object) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings(BaseSettings[Robot]):
     """Settings in the plane; see :class:`BaseSettings`."""
 
-    robot: Robot = nested(Robot, partial(Robot.prototype, model="paper"), model="paper")
+    robot: Robot = checked(cast("Robot", None), _check_robot, kind=Robot)
 
-    def __post_init__(self) -> None:
-        BaseSettings.__post_init__(self)
-        _require_one_cable(self.robot)
-
-
-def _require_one_cable(robot: Robot) -> None:
-    require(
-        robot.bends_evenly,
-        "robot has several cables, loads, precurvature or unequal segments; environments take one cable to the tip",
-    )
-
-
-def _insertable() -> Robot:
-    return Robot(length_mm=160.0, segments=18, offset_mm=8.0, model="rod", length_range_mm=(140.0, 180.0))
+    def _robot_kind(self) -> type[Robot]:
+        return Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InsertionSettings(BaseSettings[Robot]):
+class InsertionSettings(Settings):
     """Settings in the plane with a base that inserts the robot; see :class:`BaseSettings`.
 
     Attributes:
-        robot: A robot with a ``length_range_mm``; by default a rod 160 mm long, with lengths from 140 to 180 mm.
-        max_insertion_mm: Insertion of a full action [mm].
+        robot: As of :class:`BaseSettings`; without a ``length_range_mm`` it is inserted from 7/8 to 9/8 of its length.
+        max_insertion_mm: Insertion of a full action [mm]; ``None`` stands for L/180.
     """
 
-    robot: Robot = nested(Robot, _insertable, model="paper")
-    max_insertion_mm: float = checked(1.0, check_number, low=SMALLEST)
+    max_insertion_mm: float = derived(check_number, low=SMALLEST)
 
     def __post_init__(self) -> None:
-        BaseSettings.__post_init__(self)
-        _require_one_cable(self.robot)
-        require(self.robot.length_range_mm is not None, "robot has no length_range_mm; give the lengths of insertion")
+        Settings.__post_init__(self)
+        self._derive("max_insertion_mm", INSERTION * self.scales.length_mm)
         require(self.backend == "native", f"backend is {self.backend!r}; with insertion it must be 'native'")
+
+    def _make_robot(self) -> Robot:
+        robot = Settings._make_robot(self)
+        if robot.length_range_mm is not None:
+            return robot
+        shortest, longest = (part * robot.length_mm for part in INSERTED)
+        return replace(robot, length_range_mm=(shortest, longest))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,19 +218,24 @@ class SpatialSettings(BaseSettings[SpatialRobot]):
     """Settings in space; see :class:`BaseSettings`.
 
     Attributes:
-        robot: A :class:`solver.spatial.SpatialRobot`, or a mapping of its fields; by default the paper's prototype
-            with a second pair of cables.
-        cable_limit_mm: Largest cable displacement that actions can command, either way [mm].
+        robot: A :class:`solver.spatial.SpatialRobot`, the name of a preset, or a mapping of its fields; by default the
+            paper's prototype with four cables, in the paper's model two pairs of them.
         backend: ``"native"``; the reference solver does not give all that is observed in space.
     """
 
-    robot: SpatialRobot = nested(SpatialRobot, partial(SpatialRobot.prototype, model="paper"), model="paper")
-    cable_limit_mm: float = checked(10.0, check_number, low=SMALLEST)
+    robot: SpatialRobot = checked(cast("SpatialRobot", None), _check_robot, kind=SpatialRobot)
 
     def __post_init__(self) -> None:
         BaseSettings.__post_init__(self)
         require(self.backend == "native", f"backend is {self.backend!r}; in space it must be 'native'")
-        require(self.robot.model == "paper", "robot is a rod; in space environments take robots of the paper's model")
+
+    def _robot_kind(self) -> type[SpatialRobot]:
+        return SpatialRobot
+
+    def _preset(self, name: str) -> object:
+        if self.model == "rod" and not PRESETS[name].cables:
+            return SpatialRobot.preset(name, cables=SURROUNDED)
+        return BaseSettings._preset(self, name)
 
 
 AnySettings = Settings | InsertionSettings | SpatialSettings

@@ -1,4 +1,8 @@
-"""Tasks: what an episode asks, as distributions over obstacles and set-points."""
+"""Tasks: what an episode asks, as distributions over obstacles and set-points.
+
+Their ranges are multiples of the robot's natural units (:class:`ccr_gym.scales.Scales`), so that a task suits robots of
+any size: places and radii of its length L, forces of EI/L², stiffnesses of EI/L³.
+"""
 
 import math
 from abc import ABC, abstractmethod
@@ -8,7 +12,7 @@ from typing import Any, ClassVar, Generic, NamedTuple
 
 import numpy as np
 
-from ccr_gym.adapters import AnyAdapter, CableAdapter, InsertionAdapter, SpatialAdapter
+from ccr_gym.adapters import AnyAdapter, InsertionAdapter, PlanarAdapter, SpatialAdapter
 from ccr_gym.checks import (
     check_fields,
     check_flag,
@@ -19,7 +23,7 @@ from ccr_gym.checks import (
     check_type,
     checked,
 )
-from ccr_gym.scales import FORCE_SCALE_N
+from ccr_gym.scales import FORCE_SPAN, Scales
 from ccr_gym.settings import RobotT
 from solver import Circle, HalfPlane, Robot, Scene
 from solver.common.scene import MAX_OBSTACLES
@@ -30,24 +34,31 @@ Range = tuple[float, float]
 MAX_STEPS = 2**31 - 1
 PROFILE_STEPS = 128  # of a moving set-point
 LEVELS = (0.3, 1.0)  # range of its levels, before they are scaled to a maximum of 1
-HALF_CYLINDER_MM = 30.0
-CYLINDER_EDGE_MM = 2.0
-LEAST_FORCE_N, FORCE_REASON = 1e-6 * FORCE_SCALE_N, "what the observation can show, in N"
+PAPER_MM = 180.0  # length of the paper's robot
+HALF_CYLINDER = 1 / 6  # half the length of a cylinder [L]
+CYLINDER_EDGE = 1 / 90  # rounding of its edges [L]
+LEAST_FORCE, FORCE_REASON = 1e-6 * FORCE_SPAN, "what the observation can show, in EI/L²"
 CIRCLE: tuple[dict[str, float], ...] = ({}, {}, {"low": SMALLEST})  # bounds of x, y and radius
 
 
 def check_force_range(name: str, value: object) -> Range:
-    """Return the range of the magnitude of a set-point [N]; see :func:`ccr_gym.checks.check_range`."""
-    return check_range(name, value, low=LEAST_FORCE_N, high=FORCE_SCALE_N, reason=FORCE_REASON)
+    """Return the range of the magnitude of a set-point [EI/L²]; see :func:`ccr_gym.checks.check_range`."""
+    return check_range(name, value, low=LEAST_FORCE, high=FORCE_SPAN, reason=FORCE_REASON)
 
 
-def check_force(name: str, value: object) -> float:
+def check_force(name: str, value: object, unit_n: float) -> float:
     """Return the magnitude of a set-point as a float [N].
+
+    Args:
+        name: Name of the set-point.
+        value: Its magnitude [N].
+        unit_n: EI/L² of the robot [N].
 
     Raises:
         ValueError: If it is not a number that the observation can show.
     """
-    return check_number(name, value, low=LEAST_FORCE_N, high=FORCE_SCALE_N, reason=FORCE_REASON)
+    low, high = LEAST_FORCE * unit_n, FORCE_SPAN * unit_n
+    return check_number(name, value, low=low, high=high, reason="what the observation can show, in N")
 
 
 class Assignment(NamedTuple):
@@ -56,14 +67,15 @@ class Assignment(NamedTuple):
     Attributes:
         scene: The obstacles.
         desired_force: Set-point: the magnitude of the force on the robot, or the force itself ``(d,)`` [N].
-        pull: Cable displacements per millimetre of the ramp that must reach the set-point, ``(cables,)``.
+        direction: Direction of bending of the steady pull that must reach the set-point, 1 or its components along x
+            and y, ``(d − 1,)``.
         profile: Factors of the set-point at every step, ``(PROFILE_STEPS,)``, the last one kept from then on; ``None``
             for a constant set-point.
     """
 
     scene: Scene
     desired_force: float | np.ndarray
-    pull: tuple[float, ...] = (1.0,)
+    direction: tuple[float, ...] = (1.0,)
     profile: np.ndarray | None = None
 
 
@@ -82,7 +94,7 @@ class Task(ABC, Generic[RobotT]):
 
     __dataclass_fields__: ClassVar[dict[str, Field[object]]]  # of its subclasses
 
-    adapter: ClassVar[type[AnyAdapter]] = CableAdapter
+    adapter: ClassVar[type[AnyAdapter]] = PlanarAdapter
     obstacles: ClassVar[int] = 1
     target: ClassVar[int | None] = None
     moving: ClassVar[bool] = False
@@ -100,7 +112,7 @@ class Task(ABC, Generic[RobotT]):
     def sample(self, robot: RobotT, generator: np.random.Generator) -> Assignment:
         """Return the assignment of an episode; it is sampled again if it turns out to be infeasible."""
 
-    def narrowest_scenes(self) -> Sequence[Scene]:
+    def narrowest_scenes(self, robot: RobotT) -> Sequence[Scene]:
         """Return scenes of the narrowest possible obstacles, which must not fit between the points of the robot."""
         return ()
 
@@ -113,21 +125,22 @@ class LoadCell(Task[Robot]):
     """The paper's experiment (Fig. 8–10): a flat load cell beside the robot that only its 15th node meets (eq. 12).
 
     Attributes:
-        distance_mm: Range of the load cell's distance d from the unactuated backbone [mm].
-        height_mm: Height of the load cell above the base [mm].
-        force_n: Range of the set-point [N].
+        distance: Range of the load cell's distance d from the unactuated backbone [L].
+        height: Height of the load cell above the base [L].
+        force: Range of the set-point, that of the paper's Table 1 [EI/L²].
     """
 
-    distance_mm: Range = checked((24.0, 51.0), check_range, low=SMALLEST)
-    height_mm: float = checked(127.0, check_number)
-    force_n: Range = checked((0.01, 0.06), check_force_range)
+    distance: Range = checked((24 / PAPER_MM, 51 / PAPER_MM), check_range, low=SMALLEST)
+    height: float = checked(127 / PAPER_MM, check_number)
+    force: Range = checked((0.2, 1.5), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """Return a load cell and a set-point."""
-        node = round(14 / 18 * robot.segments)
-        distance, force = uniform(generator, self.distance_mm, self.force_n)
-        wall = HalfPlane(point=(distance, self.height_mm), normal=(-1.0, 0.0), nodes=(node,))
-        return Assignment(Scene([wall]), force)
+        scales, node = Scales.of(robot), round(14 / 18 * robot.segments)
+        distance, force = uniform(generator, self.distance, self.force)
+        point = distance * scales.length_mm, self.height * scales.length_mm
+        wall = HalfPlane(point=point, normal=(-1.0, 0.0), nodes=(node,))
+        return Assignment(Scene([wall]), force * scales.force_n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,25 +148,26 @@ class PushObstacle(Task[Robot]):
     """A circular obstacle somewhere in front of the robot.
 
     Attributes:
-        x_mm: Range of its centre's x [mm].
-        y_mm: Range of its centre's y [mm].
-        radius_mm: Range of its radius [mm].
-        force_n: Range of the set-point [N].
+        x: Range of its centre's x [L].
+        y: Range of its centre's y [L].
+        radius: Range of its radius [L].
+        force: Range of the set-point [EI/L²].
     """
 
-    x_mm: Range = checked((35.0, 75.0), check_range)
-    y_mm: Range = checked((75.0, 150.0), check_range)
-    radius_mm: Range = checked((10.0, 16.0), check_range, low=SMALLEST)
-    force_n: Range = checked((0.02, 0.15), check_force_range)
+    x: Range = checked((0.2, 0.42), check_range)
+    y: Range = checked((0.42, 0.83), check_range)
+    radius: Range = checked((0.056, 0.09), check_range, low=SMALLEST)
+    force: Range = checked((0.4, 2.9), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """Return a circle and a set-point."""
-        x, y, radius, force = uniform(generator, self.x_mm, self.y_mm, self.radius_mm, self.force_n)
-        return Assignment(Scene([Circle(center=(x, y), radius=radius)]), force)
+        *circle, force = uniform(generator, self.x, self.y, self.radius, self.force)
+        scales = Scales.of(robot)
+        return Assignment(Scene([_circle(scales, *circle)]), force * scales.force_n)
 
-    def narrowest_scenes(self) -> Sequence[Scene]:
+    def narrowest_scenes(self, robot: Robot) -> Sequence[Scene]:
         """Return the smallest circle."""
-        return (Scene([_smallest_circle(self.x_mm, self.y_mm, self.radius_mm)]),)
+        return (Scene([_smallest_circle(robot, self.x, self.y, self.radius)]),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,29 +203,28 @@ class BracedPush(Task[Robot]):
     """Two circular obstacles, as in the paper's Fig. 4b: the robot braces on the lower one and pushes the upper one.
 
     Attributes:
-        brace_mm: Ranges of x, y and radius of the lower one [mm].
-        goal_mm: Ranges of x, y and radius of the upper one, whose contact force is regulated [mm].
-        force_n: Range of the set-point [N].
+        brace: Ranges of x, y and radius of the lower one [L].
+        goal: Ranges of x, y and radius of the upper one, whose contact force is regulated [L].
+        force: Range of the set-point [EI/L²].
     """
 
     obstacles: ClassVar[int] = 2
     target: ClassVar[int | None] = 1
 
-    brace_mm: tuple[Range, ...] = checked(((27.0, 38.0), (75.0, 95.0), (10.0, 14.0)), check_ranges, bounds=CIRCLE)
-    goal_mm: tuple[Range, ...] = checked(((52.0, 72.0), (125.0, 150.0), (12.0, 16.0)), check_ranges, bounds=CIRCLE)
-    force_n: Range = checked((0.02, 0.12), check_force_range)
+    brace: tuple[Range, ...] = checked(((0.15, 0.21), (0.42, 0.53), (0.056, 0.078)), check_ranges, bounds=CIRCLE)
+    goal: tuple[Range, ...] = checked(((0.29, 0.4), (0.69, 0.83), (0.067, 0.09)), check_ranges, bounds=CIRCLE)
+    force: Range = checked((0.4, 2.3), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """Return two circles and a set-point."""
-        x, y, radius, goal_x, goal_y, goal_radius, force = uniform(
-            generator, *self.brace_mm, *self.goal_mm, self.force_n
-        )
-        goal = Circle(center=(goal_x, goal_y), radius=goal_radius)
-        return Assignment(Scene([Circle(center=(x, y), radius=radius), goal]), force)
+        *numbers, force = uniform(generator, *self.brace, *self.goal, self.force)
+        scales = Scales.of(robot)
+        scene = Scene([_circle(scales, *numbers[:3]), _circle(scales, *numbers[3:])])
+        return Assignment(scene, force * scales.force_n)
 
-    def narrowest_scenes(self) -> Sequence[Scene]:
+    def narrowest_scenes(self, robot: Robot) -> Sequence[Scene]:
         """Return the smallest circles."""
-        return (Scene([_smallest_circle(*self.brace_mm), _smallest_circle(*self.goal_mm)]),)
+        return (Scene([_smallest_circle(robot, *self.brace), _smallest_circle(robot, *self.goal)]),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,16 +232,18 @@ class SoftObstacle(PushObstacle):
     """A circular obstacle on a spring of unknown stiffness, which yields when pushed.
 
     Attributes:
-        spring: Range of the spring's stiffness, sampled uniformly in its logarithm [N/mm].
+        spring: Range of the spring's stiffness, sampled uniformly in its logarithm [EI/L³].
     """
 
-    spring: Range = checked((0.003, 0.1), check_range, low=SMALLEST)
+    spring: Range = checked((10.0, 350.0), check_range, low=SMALLEST)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """Return a circle on a spring and a set-point."""
         sampled = PushObstacle.sample(self, robot, generator)
         (exponent,) = uniform(generator, (math.log(self.spring[0]), math.log(self.spring[1])))
-        return sampled._replace(scene=Scene(replace(o, spring=math.exp(exponent)) for o in sampled.scene))
+        scales = Scales.of(robot)
+        spring = math.exp(exponent) * (scales.force_n / scales.length_mm)
+        return sampled._replace(scene=Scene(replace(obstacle, spring=spring) for obstacle in sampled.scene))
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +252,8 @@ class InsertAndPush(PushObstacle):
 
     adapter: ClassVar[type[AnyAdapter]] = InsertionAdapter
 
-    y_mm: Range = checked((75.0, 130.0), check_range)
+    y: Range = checked((0.47, 0.8), check_range)
+    radius: Range = checked((0.064, 0.1), check_range, low=SMALLEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,30 +261,31 @@ class SpatialPush(Task[SpatialRobot]):
     """A sphere or a cylinder somewhere around the robot.
 
     Attributes:
-        distance_mm: Range of its centre's distance from the axis of the straight robot [mm].
-        height_mm: Range of its centre's height above the base [mm].
-        radius_mm: Range of its radius [mm].
-        cylinder_fraction: Fraction of cylinders, which are 60 mm long and lie across the robot's path.
+        distance: Range of its centre's distance from the axis of the straight robot [L].
+        height: Range of its centre's height above the base [L].
+        radius: Range of its radius [L].
+        cylinder_fraction: Fraction of cylinders, which are L/3 long and lie across the robot's path.
         max_tilt: Largest angle between a cylinder's axis and the horizontal, at most π/2 [rad].
-        force_n: Range of the set-point [N].
+        force: Range of the set-point [EI/L²].
         force_vector: Whether the set-point is a force vector instead of a magnitude.
         max_ramp_angle: Largest angle between obstacle and ramp, with ``force_vector``, at most π/2 [rad].
     """
 
     adapter: ClassVar[type[AnyAdapter]] = SpatialAdapter
 
-    distance_mm: Range = checked((35.0, 65.0), check_range, low=0)
-    height_mm: Range = checked((80.0, 150.0), check_range)
-    radius_mm: Range = checked((10.0, 16.0), check_range, low=SMALLEST)
+    distance: Range = checked((0.2, 0.36), check_range, low=0)
+    height: Range = checked((0.45, 0.83), check_range)
+    radius: Range = checked((0.056, 0.09), check_range, low=SMALLEST)
     cylinder_fraction: float = checked(0.5, check_number, low=0, high=1)
     max_tilt: float = checked(math.pi / 6, check_number, low=0, high=math.pi / 2)
-    force_n: Range = checked((0.02, 0.15), check_force_range)
+    force: Range = checked((0.4, 2.9), check_force_range)
     force_vector: bool = checked(False, check_flag)
     max_ramp_angle: float = checked(0.25, check_number, low=0, high=math.pi / 2)
 
     def sample(self, robot: SpatialRobot, generator: np.random.Generator) -> Assignment:
         """Return a sphere or a cylinder, a set-point, and a ramp towards the obstacle."""
-        ranges = (self.distance_mm, self.height_mm, self.radius_mm, self.force_n)
+        scales = Scales.of(robot)
+        ranges = (self.distance, self.height, self.radius, self.force)
         distance, height, radius, force, azimuth, tilt, ramp_angle, kind = uniform(
             generator,
             *ranges,
@@ -279,21 +296,18 @@ class SpatialPush(Task[SpatialRobot]):
         )
         outward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         center = distance * outward + [0.0, 0.0, height]
-        half = HALF_CYLINDER_MM * np.array([-math.cos(tilt) * outward[1], math.cos(tilt) * outward[0], math.sin(tilt)])
-        if kind < self.cylinder_fraction:
-            scene = Scene([_cylinder(center, half, radius)])
-        else:
-            scene = Scene([Sphere(center=tuple(center.tolist()), radius=radius)])
+        across = np.array([-math.cos(tilt) * outward[1], math.cos(tilt) * outward[0], math.sin(tilt)])
+        make = _cylinder if kind < self.cylinder_fraction else _sphere
         towards = azimuth + ramp_angle if self.force_vector else azimuth
-        return Assignment(scene, force, (math.cos(towards), math.cos(towards - robot.angle)))
+        scene = Scene([make(scales, center, radius, across)])
+        return Assignment(scene, force * scales.force_n, (math.cos(towards), math.sin(towards)))
 
-    def narrowest_scenes(self) -> Sequence[Scene]:
+    def narrowest_scenes(self, robot: SpatialRobot) -> Sequence[Scene]:
         """Return the smallest sphere and the smallest cylinder, if they can be sampled."""
-        center = np.array([self.distance_mm[0], 0.0, self.height_mm[0]])
-        half, radius = np.array([0.0, HALF_CYLINDER_MM, 0.0]), self.radius_mm[0]
-        spheres = [Sphere(center=tuple(center.tolist()), radius=radius)] if self.cylinder_fraction < 1 else []
-        cylinders = [_cylinder(center, half, radius)] if self.cylinder_fraction > 0 else []
-        return [Scene([obstacle]) for obstacle in (*spheres, *cylinders)]
+        center, across = np.array([self.distance[0], 0.0, self.height[0]]), np.array([0.0, 1.0, 0.0])
+        sampled = (_sphere, self.cylinder_fraction < 1), (_cylinder, self.cylinder_fraction > 0)
+        scales = Scales.of(robot)
+        return [Scene([make(scales, center, self.radius[0], across)]) for make, possible in sampled if possible]
 
 
 TASKS: dict[str, type[AnyTask]] = {
@@ -332,11 +346,27 @@ def check_task(task: object) -> None:
         check_whole("target of the task", task.target, 0, task.obstacles - 1)
 
 
-def _smallest_circle(x_mm: Range, y_mm: Range, radius_mm: Range) -> Circle:
-    return Circle(center=(x_mm[0], y_mm[0]), radius=radius_mm[0])
+def _smallest_circle(robot: Robot, x: Range, y: Range, radius: Range) -> Circle:
+    return _circle(Scales.of(robot), x[0], y[0], radius[0])
 
 
-def _cylinder(center: np.ndarray, half: np.ndarray, radius: float) -> Cylinder:
-    """Return a cylinder around a centre whose axis extends by ``half`` either way."""
-    start, end = (tuple((center + side * half).tolist()) for side in (-1, 1))
-    return Cylinder(start=start, end=end, radius=radius, edge=CYLINDER_EDGE_MM)
+def _circle(scales: Scales, x: float, y: float, radius: float) -> Circle:
+    """Return a circle, given in multiples of L."""
+    length = scales.length_mm
+    return Circle(center=(x * length, y * length), radius=radius * length)
+
+
+def _sphere(scales: Scales, center: np.ndarray, radius: float, _: np.ndarray) -> Sphere:
+    """Return a sphere, given in multiples of L."""
+    return Sphere(center=_point(scales, center), radius=radius * scales.length_mm)
+
+
+def _cylinder(scales: Scales, center: np.ndarray, radius: float, axis: np.ndarray) -> Cylinder:
+    """Return a cylinder around a centre, given in multiples of L."""
+    start, end = (_point(scales, center + side * HALF_CYLINDER * axis) for side in (-1, 1))
+    length = scales.length_mm
+    return Cylinder(start=start, end=end, radius=radius * length, edge=CYLINDER_EDGE * length)
+
+
+def _point(scales: Scales, place: np.ndarray) -> tuple[float, ...]:
+    return tuple((place * scales.length_mm).tolist())

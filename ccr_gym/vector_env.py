@@ -135,6 +135,11 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         return self._episodes.actions
 
     @property
+    def observation_slices(self) -> dict[str, slice]:
+        """Where the named parts of an observation stand in the flat one."""
+        return self._episodes.observer.slices
+
+    @property
     def privileged_state(self) -> PrivilegedState:
         """The hidden state of all environments, which agents do not observe.
 

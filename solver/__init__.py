@@ -1,6 +1,7 @@
 """Exact optimisation-based kinematics of a cable-driven continuum robot among obstacles."""
 
 from solver.cache.memo import TransitionMemo
+from solver.common.actuation import Actuation
 from solver.common.equilibrium import Optimality, Residuals
 from solver.common.obstacle import Extent, Obstacle
 from solver.common.presets import PRESETS, Preset
@@ -33,6 +34,7 @@ from solver.planar.solve import Solver
 
 __all__ = [
     "PRESETS",
+    "Actuation",
     "BatchSolver",
     "Cable",
     "Capsule",

@@ -1,0 +1,215 @@
+"""Estimates of the contact force from what a robot can measure, as factors on the forces of the nominal model.
+
+Which points touch, the direction of the forces and how several share them are the model's knowledge; one factor on all
+of them is unknown. Both estimates are virtual work. ``contact`` takes the motion of the points that touch, and the
+tension that the free robot needs, at the displacement that the encoder reads; its rigidity is learnt before contact.
+``paper``, eq. 10 and 11, takes the motion of the free tip, and the tension gained since the onset of contact.
+
+Motions are differences between free robots, which a batch of the solver moves along, so that any cables, sections and
+loads are served alike.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ccr_gym.adapters import AnyAdapter
+from solver import RigidityFit, Robot, Scene, fitted_slopes, virtual_work
+from solver.common.operations import ARRAYS
+from solver.spatial import sides, with_friction
+from solver.spatial import virtual_work as spatial_virtual_work
+
+DIFFERENCE = 1e-4  # of a command, for slopes [a]
+LEAST_SLOPE = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
+TENSION_NOISE = 0.006  # standard deviation of the tensions that the rigidity is learnt from [EI/(aL)]
+FITTED = 1.0  # largest displacement of the straight lines of Fig. 7 [a]
+TINY = 1e-300  # keeps quotients defined where nothing touches
+
+
+class Measured(NamedTuple):
+    """What is known of k robots.
+
+    Attributes:
+        blocks: Equilibria of the nominal robot, ``(k, size)``.
+        actuated_mm: Actuated coordinates that the encoders read, ``(k, actions)`` [mm].
+        tensions: Tensions of the cables that the motors see, ``(k, cables)`` [N].
+        onsets: Those at the onset of the present contact, ``(k, cables)`` [N].
+    """
+
+    blocks: np.ndarray
+    actuated_mm: np.ndarray
+    tensions: np.ndarray
+    onsets: np.ndarray
+
+
+class FreeMotion(NamedTuple):
+    """Free robots, and how they move with the commands.
+
+    Attributes:
+        tensions: Their tensions, ``(k, cables)`` [N].
+        points: Slopes of the points that can touch, ``(k, commands, lines, positions, d)`` [mm per mm].
+        tips: Slopes of the tips, ``(k, commands, d)`` [mm per mm].
+    """
+
+    tensions: np.ndarray
+    points: np.ndarray
+    tips: np.ndarray
+
+
+class FreeRobots:
+    """N robots that nothing touches, each with companions that are pulled a little less by one command each.
+
+    Args:
+        adapter: Adapter of the robots.
+        count: Number N of robots.
+        threads: Threads of the solver.
+    """
+
+    def __init__(self, adapter: AnyAdapter, count: int, threads: int) -> None:
+        commands = adapter.actions.commands
+        self._rows = np.arange(count * (1 + commands)).reshape(count, 1 + commands)
+        self._batch = adapter.make_batch(adapter.settings, self._rows.size, 0, threads)
+        self._adapter = type(adapter)(adapter.settings, self._batch.layout)
+        self._step = DIFFERENCE * adapter.scales.travel_mm
+        for row in range(self._rows.size):
+            self._batch.assign(row, Scene())
+        self._batch.rest(range(self._rows.size))
+
+    def rest(self, robots: Sequence[int]) -> None:
+        """Bring some robots to rest."""
+        self._batch.rest(self._rows[robots].ravel().tolist())
+
+    def move(self, robots: Sequence[int], actuated_mm: np.ndarray) -> FreeMotion:
+        """Move some robots, ``(k, actions)`` [mm], and return their motion there."""
+        rows, commands = self._rows[robots], self._adapter.actions.commands
+        steps = np.where(actuated_mm[:, :commands] > 0, -self._step, self._step)
+        places = np.repeat(actuated_mm[:, None], 1 + commands, axis=1)
+        for k in range(commands):
+            places[:, 1 + k, k] += steps[:, k]
+        flat = rows.ravel().tolist()
+        self._adapter.write_command(self._batch.commands, places.reshape(len(flat), -1), flat)
+        self._batch.move(flat)
+        blocks = self._batch.blocks[flat].reshape(*rows.shape, -1)
+        layout, points = self._adapter.layout, self._adapter.points(blocks)
+        tips = layout.nodes(blocks)[..., -1, : points.shape[-1]]
+        slopes = ((ends[:, 1:] - ends[:, :1]) / _beside(steps, ends) for ends in (points, tips))
+        return FreeMotion(layout.tensions(blocks[:, 0]), *slopes)
+
+
+class ForceEstimator:
+    """Estimates the contact forces of N robots.
+
+    Attributes:
+        chosen: Factors of the estimate that is observed, on the nominal forces, ``(N,)``.
+        paper: Factors of the ``paper`` estimate, ``(N,)``.
+
+    Args:
+        adapter: Adapter of the robots.
+        count: Number N of robots.
+        threads: Threads of the solver.
+        learns: Whether the rigidity is unknown.
+    """
+
+    def __init__(self, adapter: AnyAdapter, count: int, threads: int, *, learns: bool) -> None:
+        self._adapter, self._learns = adapter, learns
+        self._contact = adapter.settings.estimator == "contact"
+        self._tip_known = adapter.layout.tip_slopes.shape != (0,)
+        self._free = FreeRobots(adapter, count, threads) if self._contact or not self._tip_known else None
+        self._slopes = _straight_lines(adapter)
+        self._fit = RigidityFit(np.ones(count), np.ones(count))  # sums that are written in place
+        self.chosen, self.paper = np.zeros(count), np.zeros(count)
+
+    def rest(self, robots: Sequence[int]) -> None:
+        """Begin new episodes of some robots."""
+        self.chosen[robots] = self.paper[robots] = 0.0
+        self._write_fit(robots, RigidityFit.prior(len(robots)))
+        if self._free is not None:
+            self._free.rest(robots)
+
+    def update(self, robots: Sequence[int], measured: Measured) -> None:
+        """Estimate anew for some robots that have moved."""
+        indices, layout = np.asarray(robots), self._adapter.layout
+        touching = layout.flags(measured.blocks).any(axis=-1)
+        self.chosen[indices[~touching]] = self.paper[indices[~touching]] = 0.0
+        wanted = np.ones(len(indices), bool) if self._learns and self._contact else touching
+        if not wanted.any():
+            return
+        measured, chosen = Measured(*(entry[wanted] for entry in measured)), indices[wanted]
+        forces = layout.forces(measured.blocks)
+        motion = None if self._free is None else self._free.move(chosen, measured.actuated_mm)
+        paper = self._paper_factors(measured, forces, motion)
+        self.paper[chosen] = paper
+        self.chosen[chosen] = paper
+        if self._contact:
+            assert motion is not None
+            ratio = self._rigidity_ratio(chosen, measured, motion, touching[wanted])
+            self.chosen[chosen] = self._contact_factors(measured, forces, motion, ratio)
+
+    def _rigidity_ratio(
+        self, robots: np.ndarray, measured: Measured, motion: FreeMotion, touching: np.ndarray
+    ) -> np.ndarray:
+        """Return rigidities over their nominal values, learnt while nothing touches, ``(k,)``."""
+        if not self._learns:
+            return np.ones(len(robots))
+        noise = TENSION_NOISE * self._adapter.scales.tension_n
+        fit = RigidityFit(self._fit.products[robots], self._fit.squares[robots])
+        fit = fit.updated(measured.tensions, motion.tensions, touching, noise)
+        self._write_fit(robots, fit)
+        return fit.ratio
+
+    def _write_fit(self, robots: Sequence[int] | np.ndarray, fit: RigidityFit) -> None:
+        self._fit.products[robots], self._fit.squares[robots] = fit.products, fit.squares
+
+    def _contact_factors(
+        self, measured: Measured, forces: np.ndarray, motion: FreeMotion, ratio: np.ndarray
+    ) -> np.ndarray:
+        """Return the factors for which forces do the work at the points that touch that the cables lack, ``(k,)``."""
+        adapter, scales = self._adapter, self._adapter.scales
+        multipliers = adapter.layout.multipliers(measured.blocks)
+        shares = multipliers / np.maximum(multipliers.sum(axis=(-2, -1), keepdims=True), TINY)
+        pressed = np.sum(shares[..., None] * forces[:, :, None, None], axis=1)
+        works = -np.sum(pressed[:, None] * motion.points, axis=(-3, -2, -1))
+        lacking = adapter.actuation.forces(measured.tensions - ratio[:, None] * motion.tensions)
+        least = LEAST_SLOPE * scales.length_mm / scales.travel_mm * np.linalg.norm(forces, axis=-1).sum(axis=-1)
+        return np.maximum(_dot(works, lacking), 0.0) / np.maximum(np.maximum(_dot(works, works), least**2), TINY)
+
+    def _paper_factors(self, measured: Measured, forces: np.ndarray, motion: FreeMotion | None) -> np.ndarray:
+        """Return the factors for which the forces at the free tip do the work of the loads since onset, ``(k,)``."""
+        adapter, blocks, friction = self._adapter, measured.blocks, self._adapter.settings.estimator_friction
+        total, loads = forces.sum(axis=1), measured.tensions - measured.onsets
+        planar = adapter.space == 2
+        if planar:
+            total = total + friction * np.stack([-total[:, 1], total[:, 0]], axis=-1)  # n + μ t, t the normal turned
+        if planar and self._tip_known:
+            slopes = adapter.layout.tip_slopes(blocks).T if self._slopes is None else self._slopes
+            return np.asarray(virtual_work(*total.T, loads[:, 0], slopes, adapter.scales.travel_mm, ARRAYS))
+        if self._tip_known:
+            slopes = adapter.layout.tip_slopes(blocks) * np.array([1.0, 1.0, 1.0, *2 * [adapter.scales.travel_mm]])
+            loads = sides(adapter.layout.cables(blocks)) * measured.tensions - measured.onsets
+            return spatial_virtual_work(with_friction(total, slopes[..., :3], friction), loads, slopes)
+        assert motion is not None
+        works = -np.stack([_dot(total, motion.tips[:, k]) for k in range(motion.tips.shape[1])], axis=-1)
+        given = adapter.actuation.forces(loads)
+        return np.maximum(_dot(works, given), 0.0) / np.maximum(_dot(works, works), TINY)
+
+
+def _straight_lines(adapter: AnyAdapter) -> np.ndarray | None:
+    """Return the slopes of Fig. 7 for the paper's planar robot, None for others, whose slopes are exact."""
+    robot = adapter.settings.robot
+    if not isinstance(robot, Robot) or robot.model != "paper" or robot.length_range_mm is not None:
+        return None
+    return fitted_slopes(robot, 0.0, FITTED * adapter.scales.travel_mm)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return dot products along the last axis, added term by term: the bits do not depend on their number."""
+    total = a[..., 0] * b[..., 0]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., k] * b[..., k]
+    return np.asarray(total)
+
+
+def _beside(steps: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Return steps ``(k, commands)`` with axes of length 1 added to divide differences of ``ends``."""
+    return steps.reshape(*steps.shape, *(1,) * (ends.ndim - 2))
