@@ -18,21 +18,20 @@ from ccr_gym.envs import (
     SpatialPushEnv,
     TrackForceEnv,
 )
-from ccr_gym.episodes import PrivilegedState
+from ccr_gym.readings import PrivilegedState
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
 from ccr_gym.scales import AHEAD, FORCE_SPAN, Scales
 from ccr_gym.sensing import Sensing
 from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
+from ccr_gym.task import Assignment, Task
 from ccr_gym.tasks import (
-    Assignment,
     BracedPush,
     InsertAndPush,
     LoadCell,
     PushObstacle,
     SoftObstacle,
     SpatialPush,
-    Task,
     TrackForce,
 )
 from ccr_gym.vector_env import ContactVectorEnv, make_vector_env

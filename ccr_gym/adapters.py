@@ -90,7 +90,7 @@ class RobotAdapter(ABC, Generic[SettingsT]):
 
     def clip(self, actions: np.ndarray) -> np.ndarray:
         """Return actions ``(..., actions)`` within [−1, 1]."""
-        return np.minimum(np.maximum(actions.astype(float), -1.0), 1.0)
+        return np.asarray(np.minimum(np.maximum(actions.astype(float), -1.0), 1.0))
 
     def mean_square(self, actions: np.ndarray) -> np.ndarray:
         """Return the mean square over the actions, added one by one: the bits do not depend on their number of rows."""
@@ -101,7 +101,7 @@ class RobotAdapter(ABC, Generic[SettingsT]):
 
     def bounded(self, actuated_mm: np.ndarray) -> np.ndarray:
         """Return actuated coordinates ``(..., actions)`` within their bounds [mm]."""
-        return np.minimum(np.maximum(actuated_mm, self.actions.low_mm), self.actions.high_mm)
+        return np.asarray(np.minimum(np.maximum(actuated_mm, self.actions.low_mm), self.actions.high_mm))
 
     def write_command(self, commands: np.ndarray, actuated_mm: np.ndarray, index: EnvIndex) -> None:
         """Write what actuated coordinates command to rows of a batch's commands.

@@ -11,14 +11,14 @@ from gymnasium import spaces
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import check_array, check_choice, check_names, check_seed, check_type, refusal
-from ccr_gym.episodes import EpisodeBatch, ForceReading, PrivilegedState
+from ccr_gym.episodes import EpisodeBatch
+from ccr_gym.readings import ForceReading, PrivilegedState
 from ccr_gym.rendering import Frame, Renderer
 from ccr_gym.reward import TERMS
 from ccr_gym.scales import FORCE_SPAN, Scales
 from ccr_gym.settings import AnySettings
-from ccr_gym.tasks import AnyTask, Assignment, check_force, check_task
+from ccr_gym.task import AnyTask, Assignment, check_force, check_task
 from solver import Equilibrium, Scene
-from solver.common.validation import is_listed
 from solver.spatial import SpatialEquilibrium
 
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -212,7 +212,7 @@ def _given_assignment(options: Info | None, task: AnyTask, scales: Scales) -> As
     if set(options) != {"scene", "desired_force"}:
         raise refusal("options", options, wanted)
     scene, space = options["scene"], task.adapter.space
-    if is_listed(scene):
+    if isinstance(scene, list | tuple):
         scene = Scene(scene)
     check_type("scene", scene, Scene, "a Scene or a list of obstacles")
     for obstacle in scene:

@@ -11,7 +11,8 @@ from ccr_gym.observation import Observer
 from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SPAN, SUCCESS_ERROR
 from ccr_gym.scales import AHEAD, FORCE_SPAN, RADIUS_SPAN
 from ccr_gym.settings import AnySettings
-from ccr_gym.tasks import LEVELS, AnyTask
+from ccr_gym.task import AnyTask
+from ccr_gym.tasks import LEVELS
 from solver import Robot
 
 WIDTH = 116
@@ -119,6 +120,7 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
     """Return meaning and scale of an entry of the observation."""
     robot, force = settings.robot, f"{FORCE_SPAN * settings.scales.force_n:.3g} N"
     planar, space = isinstance(robot, Robot), task.adapter.space
+    radius = RADIUS_SPAN * settings.scales.length_mm
     lines = ", ".join(robot.touch) if planar else "backbone, first and second hole, opposite holes"
     length = f"{max(robot.lengths_mm) if isinstance(robot, Robot) else robot.length_mm:g} mm"
     whose = "" if task.target is None else f" of obstacle {task.target}"
@@ -137,7 +139,10 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
             if planar
             else ("x, y, z of nodes 0…n, node by node", length)
         ),
-        "obstacle": ("centre x, y, z; axis of a cylinder, else 0; radius", f"{length}, 1, {RADIUS_SPAN * settings.scales.length_mm:g} mm"),
+        "obstacle": (
+            "centre x, y, z; axis of a cylinder, else 0; radius",
+            f"{length}, 1, {radius:g} mm",
+        ),
     }[key]
 
 

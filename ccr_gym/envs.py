@@ -6,8 +6,8 @@ from typing import ClassVar
 from ccr_gym.checks import check_choice
 from ccr_gym.contact_env import ContactEnv
 from ccr_gym.describe import describe
+from ccr_gym.task import AnyTask
 from ccr_gym.tasks import (
-    AnyTask,
     BracedPush,
     InsertAndPush,
     LoadCell,

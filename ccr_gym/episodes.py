@@ -15,63 +15,18 @@ from ccr_gym.checks import require
 from ccr_gym.estimation import ForceEstimator, Measured
 from ccr_gym.observation import Observer
 from ccr_gym.quantities import EnvIndex, Quantity, as_scalar, norm, operations
+from ccr_gym.readings import ForceReading, PrivilegedState
 from ccr_gym.reward import SUCCESS_ERROR, TERMS, reward_terms
 from ccr_gym.sampling import Trials, check_robot
 from ccr_gym.scales import AHEAD
 from ccr_gym.sensing import Imperfections, SensorModel, sample_imperfections
 from ccr_gym.settings import AnySettings
-from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment
+from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment
 from solver import Equilibrium
 from solver.common.batch import BaseBatch
 from solver.spatial import SpatialEquilibrium
 
 ALL = slice(None)
-
-
-class ForceReading(NamedTuple):
-    """Contact forces of one robot, or of many, and their set-points.
-
-    Attributes:
-        blocks: Equilibria, ``(..., size)``.
-        force_true: Energy-based contact force on the robot, of the obstacle that matters, ``(..., d)`` [N].
-        force_est: Its estimate, ``(..., d)`` [N].
-        force_paper: Its estimate by eq. 11, ``(..., d)`` [N].
-        regulated: The one of them that is desired, ``(..., d)`` [N].
-        force: Magnitude of the regulated force [N].
-        desired: Magnitude of the set-point [N].
-        goal: The set-point, a magnitude or ``(..., d)`` [N].
-        error: Relative force error.
-    """
-
-    blocks: np.ndarray
-    force_true: np.ndarray
-    force_est: np.ndarray
-    force_paper: np.ndarray
-    regulated: np.ndarray
-    force: Quantity
-    desired: Quantity
-    goal: Quantity
-    error: Quantity
-
-
-class PrivilegedState(NamedTuple):
-    """The hidden state of one robot, or of many, for oracles and teachers; agents do not observe it.
-
-    Attributes:
-        force: Contact force on the robot that is regulated, ``(..., d)`` [N].
-        rigidity_ratio: Rigidity over its nominal value.
-        goal: Set-point after the next step, a magnitude or ``(..., d)`` [N].
-        actuated_mm: Actuated coordinates of the robot, ``(..., actions)`` [mm].
-        motor_mm: Positions of the motors, ``(..., actions)`` [mm].
-        half_backlash_mm: How far both can be apart, ``(..., actions)`` [mm].
-    """
-
-    force: np.ndarray
-    rigidity_ratio: Quantity
-    goal: Quantity
-    actuated_mm: np.ndarray
-    motor_mm: np.ndarray
-    half_backlash_mm: np.ndarray
 
 
 class Pipeline(NamedTuple):
@@ -248,10 +203,12 @@ class EpisodeBatch:
         """Return the present contact forces."""
         blocks, estimator = self.batch.blocks[index], self._estimator
         nominal = self._forces(blocks)
-        estimates = [np.asarray(factors[index])[..., None] * nominal for factors in (estimator.chosen, estimator.paper)]
+        chosen, paper = (
+            np.asarray(factors[index])[..., None] * nominal for factors in (estimator.chosen, estimator.paper)
+        )
         ratio = 1.0 if self._sensors is None else np.asarray(self._sensors.rigidity_ratio[index])[..., None]
         force_true = ratio * nominal
-        regulated = force_true if self._settings.regulate == "true" else estimates[0]
+        regulated = force_true if self._settings.regulate == "true" else chosen
         force = as_scalar(norm(regulated), index)
         desired = self._desired(0, index)
         if self._vector:
@@ -259,7 +216,7 @@ class EpisodeBatch:
             error = as_scalar(norm(goal - regulated), index) / desired
         else:
             goal, error = desired, abs(force - desired) / desired
-        return ForceReading(blocks, force_true, *estimates, regulated, force, desired, goal, error)
+        return ForceReading(blocks, force_true, chosen, paper, regulated, force, desired, goal, error)
 
     def _forces(self, blocks: np.ndarray) -> np.ndarray:
         """Return the regulated contact force of robots of nominal rigidity, ``(..., d)`` [N]."""

@@ -76,11 +76,11 @@ class FreeRobots:
             self._batch.assign(row, Scene())
         self._batch.rest(range(self._rows.size))
 
-    def rest(self, robots: Sequence[int]) -> None:
+    def rest(self, robots: Sequence[int] | np.ndarray) -> None:
         """Bring some robots to rest."""
         self._batch.rest(self._rows[robots].ravel().tolist())
 
-    def move(self, robots: Sequence[int], actuated_mm: np.ndarray) -> FreeMotion:
+    def move(self, robots: np.ndarray, actuated_mm: np.ndarray) -> FreeMotion:
         """Move some robots, ``(k, actions)`` [mm], and return their motion there."""
         rows, commands = self._rows[robots], self._adapter.actions.commands
         steps = np.where(actuated_mm[:, :commands] > 0, -self._step, self._step)
@@ -127,10 +127,10 @@ class ForceEstimator:
         if self._free is not None:
             self._free.rest(robots)
 
-    def update(self, robots: Sequence[int], measured: Measured) -> None:
+    def update(self, robots: Sequence[int] | np.ndarray, measured: Measured) -> None:
         """Estimate anew for some robots that have moved."""
         indices, layout = np.asarray(robots), self._adapter.layout
-        touching = layout.flags(measured.blocks).any(axis=-1)
+        touching = np.asarray(layout.flags(measured.blocks).any(axis=-1))
         self.chosen[indices[~touching]] = self.paper[indices[~touching]] = 0.0
         wanted = np.ones(len(indices), bool) if self._learns and self._contact else touching
         if not wanted.any():
@@ -172,7 +172,8 @@ class ForceEstimator:
         works = -np.sum(pressed[:, None] * motion.points, axis=(-3, -2, -1))
         lacking = adapter.actuation.forces(measured.tensions - ratio[:, None] * motion.tensions)
         least = LEAST_SLOPE * scales.length_mm / scales.travel_mm * np.linalg.norm(forces, axis=-1).sum(axis=-1)
-        return np.maximum(_dot(works, lacking), 0.0) / np.maximum(np.maximum(_dot(works, works), least**2), TINY)
+        squares = np.maximum(np.maximum(_dot(works, works), least**2), TINY)
+        return np.asarray(np.maximum(_dot(works, lacking), 0.0) / squares)
 
     def _paper_factors(self, measured: Measured, forces: np.ndarray, motion: FreeMotion | None) -> np.ndarray:
         """Return the factors for which the forces at the free tip do the work of the loads since onset, ``(k,)``."""
@@ -183,7 +184,9 @@ class ForceEstimator:
             total = total + friction * np.stack([-total[:, 1], total[:, 0]], axis=-1)  # n + μ t, t the normal turned
         if planar and self._tip_known:
             slopes = adapter.layout.tip_slopes(blocks).T if self._slopes is None else self._slopes
-            return np.asarray(virtual_work(*total.T, loads[:, 0], slopes, adapter.scales.travel_mm, ARRAYS))
+            return np.asarray(
+                virtual_work(total[:, 0], total[:, 1], loads[:, 0], slopes, adapter.scales.travel_mm, ARRAYS)
+            )
         if self._tip_known:
             slopes = adapter.layout.tip_slopes(blocks) * np.array([1.0, 1.0, 1.0, *2 * [adapter.scales.travel_mm]])
             loads = sides(adapter.layout.cables(blocks)) * measured.tensions - measured.onsets
@@ -191,7 +194,7 @@ class ForceEstimator:
         assert motion is not None
         works = -np.stack([_dot(total, motion.tips[:, k]) for k in range(motion.tips.shape[1])], axis=-1)
         given = adapter.actuation.forces(loads)
-        return np.maximum(_dot(works, given), 0.0) / np.maximum(_dot(works, works), TINY)
+        return np.asarray(np.maximum(_dot(works, given), 0.0) / np.maximum(_dot(works, works), TINY))
 
 
 def _straight_lines(adapter: AnyAdapter) -> np.ndarray | None:

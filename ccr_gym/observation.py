@@ -9,7 +9,7 @@ from ccr_gym.adapters import AnyAdapter, Feature, Features
 from ccr_gym.quantities import Quantity
 from ccr_gym.scales import AHEAD, FORCE_SPAN
 from ccr_gym.sensing import DELAYED_KEYS
-from ccr_gym.tasks import AnyTask
+from ccr_gym.task import AnyTask
 
 SENSOR_KEYS = ("force_error", "force_measured")  # absent without a force sensor
 NOT_NEGATIVE = ("length", "desired_ahead", "contact")

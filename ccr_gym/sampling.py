@@ -12,7 +12,7 @@ from ccr_gym.quantities import norm
 from ccr_gym.scales import FORCE_SPAN, Scales
 from ccr_gym.sensing import Imperfections
 from ccr_gym.settings import AnySettings
-from ccr_gym.tasks import PROFILE_STEPS, AnyTask, Assignment, check_force
+from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment, check_force
 from solver import Scene, Status
 from solver.common.checks import check_core
 from solver.common.robot import AnyRobot
@@ -119,9 +119,7 @@ class Trials:
             found, reached = self._pull_by_estimate(robots, wanted, limit, bending)
         else:
             increment = PULL * self._adapter.scales.travel_mm
-            found, reached = self._batch.ramp_reaches_force(
-                robots, wanted, increment, limit, pulls, self._task.target
-            )
+            found, reached = self._batch.ramp_reaches_force(robots, wanted, increment, limit, pulls, self._task.target)
         if not self._task.force_vector:
             return found, forces[:, None]
         goals = reached * (ratio / MARGIN)[:, None]

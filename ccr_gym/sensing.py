@@ -69,9 +69,7 @@ class Imperfections(NamedTuple):
     force_error_n: np.ndarray
 
 
-def sample_imperfections(
-    sensing: Sensing, scales: Scales, space: int, generator: np.random.Generator
-) -> Imperfections:
+def sample_imperfections(sensing: Sensing, scales: Scales, space: int, generator: np.random.Generator) -> Imperfections:
     """Return the imperfections of an episode.
 
     Args:
@@ -81,7 +79,7 @@ def sample_imperfections(
         generator: Generator of the environment.
     """
     latency, backlash, loss, rigidity, noise, *biases = generator.random(5 + space).tolist()
-    low, high = sensing.latency
+    low, high = map(int, sensing.latency)
     bias = [_interpolate(sensing.bias, abs(2 * part - 1)) * math.copysign(1, part - 0.5) for part in biases]
     white = generator.normal(size=(NOISE_STEPS, space))
     return Imperfections(

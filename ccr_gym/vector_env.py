@@ -12,10 +12,12 @@ from gymnasium.vector.utils import batch_space
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import as_array, check_array, check_choice, check_seed, check_type, refusal, require
 from ccr_gym.contact_env import METADATA, Info, Observation, make_settings, single_spaces
-from ccr_gym.episodes import EpisodeBatch, PrivilegedState
+from ccr_gym.episodes import EpisodeBatch
 from ccr_gym.quantities import Quantity
+from ccr_gym.readings import PrivilegedState
 from ccr_gym.reward import TERMS
-from ccr_gym.tasks import MAX_STEPS, TASKS, AnyTask, make_task
+from ccr_gym.task import MAX_STEPS, AnyTask
+from ccr_gym.tasks import TASKS, make_task
 from solver.common.validation import check_sequence, check_whole, is_listed, shown
 
 MAX_ENVS = 65_536

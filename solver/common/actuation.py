@@ -50,11 +50,10 @@ class Actuation:
         sides = np.array([cable.hole_mm[:axes] for cable in given]) / robot.offset_mm
         if robot.model == "paper":
             return cls(np.eye(cables), None, 1, sides, np.full(cables, float(1 - axes)), np.ones(cables))
-        ends = np.unique([cable.end for cable in given])
+        last = np.array([cable.end for cable in given])
+        ends = np.unique(last)
         sides[np.abs(sides) < RIGHT_ANGLE] = 0.0
-        passed, own = (
-            np.array([compare(cable.end, ends) for cable in given]) for compare in (np.greater_equal, np.equal)
-        )
+        passed, own = last[:, None] >= ends, last[:, None] == ends
         pulls = own[:, :, None] * sides[:, None]
         # Bending summed up to a section follows from its own cables; a section's is the difference to the one before.
         summed = pulls / np.maximum(np.sum(sides**2, axis=1), RIGHT_ANGLE)[:, None, None]
