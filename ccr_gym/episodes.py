@@ -191,7 +191,7 @@ class EpisodeBatch:
 
     def _estimate(self, index: EnvIndex) -> None:
         """Estimate the forces of robots that have moved."""
-        robots = np.atleast_1d(np.arange(self.count)[index])
+        robots = np.atleast_1d(np.arange(self.count)[index]).tolist()
         blocks = self.batch.blocks[robots]
         tensions, onsets, encoders = self._layout.tensions(blocks), self._layout.onset(blocks), self._actuated_mm
         if self._sensors is not None:

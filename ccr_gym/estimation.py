@@ -184,9 +184,8 @@ class ForceEstimator:
             total = total + friction * np.stack([-total[:, 1], total[:, 0]], axis=-1)  # n + μ t, t the normal turned
         if planar and self._tip_known:
             slopes = adapter.layout.tip_slopes(blocks).T if self._slopes is None else self._slopes
-            return np.asarray(
-                virtual_work(total[:, 0], total[:, 1], loads[:, 0], slopes, adapter.scales.travel_mm, ARRAYS)
-            )
+            x, y, offset = total[:, 0], total[:, 1], adapter.scales.travel_mm
+            return np.asarray(virtual_work(x, y, loads[:, 0], slopes, offset, ARRAYS))
         if self._tip_known:
             slopes = adapter.layout.tip_slopes(blocks) * np.array([1.0, 1.0, 1.0, *2 * [adapter.scales.travel_mm]])
             loads = sides(adapter.layout.cables(blocks)) * measured.tensions - measured.onsets

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.common.operations import ARRAYS, NUMBERS, Operations
 
-EnvIndex = int | slice | list[int] | np.ndarray  # one environment, a range of them, or some
+EnvIndex = int | slice | list[int]  # one environment, a range of them, or some
 Quantity = Any  # a float for one environment, (N,) for many; a union of both would need a cast at every use
 
 
