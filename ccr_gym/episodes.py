@@ -27,6 +27,7 @@ from solver.common.batch import BaseBatch
 from solver.spatial import SpatialEquilibrium
 
 ALL = slice(None)
+SEEDS = 2**32
 
 
 class Pipeline(NamedTuple):
@@ -123,8 +124,11 @@ class EpisodeBatch:
         self._start(robots, forces, assignments, imperfections)
 
     def _sample_imperfections(self, generator: np.random.Generator) -> Imperfections | None:
-        ranges = self._settings.sensors
-        return sample_imperfections(ranges, self._settings.scales, self.adapter.space, generator) if ranges else None
+        """Return the imperfections of an episode, sampled aside so that scenes are the same whatever the sensing."""
+        ranges, seed = self._settings.sensors, int(generator.integers(SEEDS))
+        if ranges is None:
+            return None
+        return sample_imperfections(ranges, self._settings.scales, self.adapter.space, np.random.default_rng(seed))
 
     def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
         """Start a given episode of a robot; its generator samples the imperfections.
@@ -192,12 +196,14 @@ class EpisodeBatch:
     def _estimate(self, index: EnvIndex) -> None:
         """Estimate the forces of robots that have moved."""
         robots = np.atleast_1d(np.arange(self.count)[index]).tolist()
-        blocks = self.batch.blocks[robots]
-        tensions, onsets, encoders = self._layout.tensions(blocks), self._layout.onset(blocks), self._actuated_mm
+        self._estimator.update(robots, self._measured(self.batch.blocks[robots], self._encoders(robots), robots))
+
+    def _measured(self, blocks: np.ndarray, actuated_mm: np.ndarray, index: EnvIndex) -> Measured:
+        """Return what is measured of robots in equilibria ``(k, size)`` with encoders that read ``(k, actions)``."""
+        tensions, onsets = self._layout.tensions(blocks), self._layout.onset(blocks)
         if self._sensors is not None:
-            tensions, onsets = (self._sensors.motor_tensions(entry, robots) for entry in (tensions, onsets))
-            encoders = self._sensors.motor_mm(ALL)
-        self._estimator.update(robots, Measured(blocks, encoders[robots], tensions, onsets))
+            tensions, onsets = (self._sensors.motor_tensions(entry, index) for entry in (tensions, onsets))
+        return Measured(blocks, actuated_mm, tensions, onsets)
 
     def read(self, index: int | slice = ALL) -> ForceReading:
         """Return the present contact forces."""
@@ -299,9 +305,13 @@ class EpisodeBatch:
         Returns:
             Regulated contact forces, ``(N, d)`` [N].
         """
-        commands = self.batch.commands.copy()
-        self.adapter.write_command(commands, self.adapter.bounded(actuated_mm), ALL)
-        forces = self._forces(self.batch.probe(commands))
+        commands, actuated_mm = self.batch.commands.copy(), self.adapter.bounded(actuated_mm)
+        self.adapter.write_command(commands, actuated_mm, ALL)
+        blocks = self.batch.probe(commands)
+        forces = self._forces(blocks)
+        if self._settings.regulate == "estimate":
+            factors = self._estimator.probe(self._measured(blocks, actuated_mm, ALL))
+            return np.asarray(factors[:, None] * forces)
         return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:

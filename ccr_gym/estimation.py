@@ -81,16 +81,34 @@ class FreeRobots:
         self._batch.rest(self._rows[robots].ravel().tolist())
 
     def move(self, robots: np.ndarray, actuated_mm: np.ndarray) -> FreeMotion:
-        """Move some robots, ``(k, actions)`` [mm], and return their motion there."""
-        rows, commands = self._rows[robots], self._adapter.actions.commands
-        steps = np.where(actuated_mm[:, :commands] > 0, -self._step, self._step)
-        places = np.repeat(actuated_mm[:, None], 1 + commands, axis=1)
-        for k in range(commands):
+        """Move some robots to actuated coordinates ``(k, actions)`` [mm], and return their motion there."""
+        rows = self._rows[robots].ravel().tolist()
+        self._command(self._batch.commands, rows, actuated_mm)
+        self._batch.move(rows)
+        return self._motion(self._batch.blocks[rows], actuated_mm)
+
+    def probe(self, actuated_mm: np.ndarray) -> FreeMotion:
+        """Return the motion of all robots at other actuated coordinates ``(N, actions)`` [mm]; nothing moves."""
+        commands = self._batch.commands.copy()
+        self._command(commands, self._rows.ravel().tolist(), actuated_mm)
+        return self._motion(self._batch.probe(commands), actuated_mm)
+
+    def _steps(self, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return by how much the companions are pulled more, ``(k, commands)`` [mm]."""
+        pulled = actuated_mm[:, : self._adapter.actions.commands] > 0
+        return np.where(pulled, -self._step, self._step)
+
+    def _command(self, commands: np.ndarray, rows: list[int], actuated_mm: np.ndarray) -> None:
+        """Write commands of robots and their companions."""
+        count, steps = self._adapter.actions.commands, self._steps(actuated_mm)
+        places = np.repeat(actuated_mm[:, None], 1 + count, axis=1)
+        for k in range(count):
             places[:, 1 + k, k] += steps[:, k]
-        flat = rows.ravel().tolist()
-        self._adapter.write_command(self._batch.commands, places.reshape(len(flat), -1), flat)
-        self._batch.move(flat)
-        blocks = self._batch.blocks[flat].reshape(*rows.shape, -1)
+        self._adapter.write_command(commands, places.reshape(len(rows), -1), rows)
+
+    def _motion(self, rows: np.ndarray, actuated_mm: np.ndarray) -> FreeMotion:
+        """Return the motion from blocks of robots and their companions, ``(k (1 + commands), size)``."""
+        blocks, steps = rows.reshape(len(actuated_mm), -1, rows.shape[-1]), self._steps(actuated_mm)
         layout, points = self._adapter.layout, self._adapter.points(blocks)
         tips = layout.nodes(blocks)[..., -1, : points.shape[-1]]
         slopes = ((ends[:, 1:] - ends[:, :1]) / _beside(steps, ends) for ends in (points, tips))
@@ -117,55 +135,54 @@ class ForceEstimator:
         self._tip_known = adapter.layout.tip_slopes.shape != (0,)
         self._free = FreeRobots(adapter, count, threads) if self._contact or not self._tip_known else None
         self._slopes = _straight_lines(adapter)
-        self._fit = RigidityFit(np.ones(count), np.ones(count))  # sums that are written in place
+        self._products, self._squares = np.ones(count), np.ones(count)
         self.chosen, self.paper = np.zeros(count), np.zeros(count)
 
     def rest(self, robots: Sequence[int]) -> None:
         """Begin new episodes of some robots."""
         self.chosen[robots] = self.paper[robots] = 0.0
-        self._write_fit(robots, RigidityFit.prior(len(robots)))
+        prior = RigidityFit.prior()
+        self._products[robots], self._squares[robots] = prior.products, prior.squares
         if self._free is not None:
             self._free.rest(robots)
 
-    def update(self, robots: Sequence[int] | np.ndarray, measured: Measured) -> None:
+    def update(self, robots: Sequence[int], measured: Measured) -> None:
         """Estimate anew for some robots that have moved."""
-        indices, layout = np.asarray(robots), self._adapter.layout
-        touching = np.asarray(layout.flags(measured.blocks).any(axis=-1))
+        indices, learning = np.array(robots, int), self._learns and self._contact
+        touching = np.asarray(self._adapter.layout.flags(measured.blocks).any(axis=-1))
         self.chosen[indices[~touching]] = self.paper[indices[~touching]] = 0.0
-        wanted = np.ones(len(indices), bool) if self._learns and self._contact else touching
+        wanted = touching | learning
         if not wanted.any():
             return
-        measured, chosen = Measured(*(entry[wanted] for entry in measured)), indices[wanted]
-        forces = layout.forces(measured.blocks)
-        motion = None if self._free is None else self._free.move(chosen, measured.actuated_mm)
-        paper = self._paper_factors(measured, forces, motion)
-        self.paper[chosen] = paper
-        self.chosen[chosen] = paper
-        if self._contact:
-            assert motion is not None
-            ratio = self._rigidity_ratio(chosen, measured, motion, touching[wanted])
-            self.chosen[chosen] = self._contact_factors(measured, forces, motion, ratio)
+        indices, touching = indices[wanted], touching[wanted]
+        measured = Measured(*(entry[wanted] for entry in measured))
+        motion = None if self._free is None else self._free.move(indices, measured.actuated_mm)
+        if learning and motion is not None:
+            self._learn(indices, measured, motion, touching)
+        self.paper[indices] = self._paper_factors(measured, motion)
+        self.chosen[indices] = self._chosen_factors(indices, measured, motion)
 
-    def _rigidity_ratio(
-        self, robots: np.ndarray, measured: Measured, motion: FreeMotion, touching: np.ndarray
-    ) -> np.ndarray:
-        """Return rigidities over their nominal values, learnt while nothing touches, ``(k,)``."""
-        if not self._learns:
-            return np.ones(len(robots))
+    def probe(self, measured: Measured) -> np.ndarray:
+        """Return the factors of the estimate that is observed for all robots elsewhere, ``(N,)``; nothing moves."""
+        motion = None if self._free is None else self._free.probe(measured.actuated_mm)
+        return self._chosen_factors(np.arange(len(self.chosen)), measured, motion)
+
+    def _chosen_factors(self, robots: np.ndarray, measured: Measured, motion: FreeMotion | None) -> np.ndarray:
+        if not self._contact or motion is None:
+            return self._paper_factors(measured, motion)
+        return self._contact_factors(measured, motion, self._products[robots] / self._squares[robots])
+
+    def _learn(self, robots: np.ndarray, measured: Measured, motion: FreeMotion, touching: np.ndarray) -> None:
+        """Learn the rigidity over its nominal value from robots that nothing touches."""
+        fit = RigidityFit(self._products[robots], self._squares[robots])
         noise = TENSION_NOISE * self._adapter.scales.tension_n
-        fit = RigidityFit(self._fit.products[robots], self._fit.squares[robots])
         fit = fit.updated(measured.tensions, motion.tensions, touching, noise)
-        self._write_fit(robots, fit)
-        return fit.ratio
+        self._products[robots], self._squares[robots] = fit.products, fit.squares
 
-    def _write_fit(self, robots: Sequence[int] | np.ndarray, fit: RigidityFit) -> None:
-        self._fit.products[robots], self._fit.squares[robots] = fit.products, fit.squares
-
-    def _contact_factors(
-        self, measured: Measured, forces: np.ndarray, motion: FreeMotion, ratio: np.ndarray
-    ) -> np.ndarray:
+    def _contact_factors(self, measured: Measured, motion: FreeMotion, ratio: np.ndarray) -> np.ndarray:
         """Return the factors for which forces do the work at the points that touch that the cables lack, ``(k,)``."""
         adapter, scales = self._adapter, self._adapter.scales
+        forces = adapter.layout.forces(measured.blocks)
         multipliers = adapter.layout.multipliers(measured.blocks)
         shares = multipliers / np.maximum(multipliers.sum(axis=(-2, -1), keepdims=True), TINY)
         pressed = np.sum(shares[..., None] * forces[:, :, None, None], axis=1)
@@ -175,10 +192,10 @@ class ForceEstimator:
         squares = np.maximum(np.maximum(_dot(works, works), least**2), TINY)
         return np.asarray(np.maximum(_dot(works, lacking), 0.0) / squares)
 
-    def _paper_factors(self, measured: Measured, forces: np.ndarray, motion: FreeMotion | None) -> np.ndarray:
+    def _paper_factors(self, measured: Measured, motion: FreeMotion | None) -> np.ndarray:
         """Return the factors for which the forces at the free tip do the work of the loads since onset, ``(k,)``."""
         adapter, blocks, friction = self._adapter, measured.blocks, self._adapter.settings.estimator_friction
-        total, loads = forces.sum(axis=1), measured.tensions - measured.onsets
+        total, loads = adapter.layout.force(blocks), measured.tensions - measured.onsets
         planar = adapter.space == 2
         if planar:
             total = total + friction * np.stack([-total[:, 1], total[:, 0]], axis=-1)  # n + μ t, t the normal turned

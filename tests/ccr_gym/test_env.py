@@ -10,7 +10,8 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import ccr_gym
 from agents.policy import search
-from ccr_gym import FORCE_SCALE_N, PushObstacleEnv
+from ccr_gym import FORCE_SPAN, PushObstacleEnv
+from ccr_gym.reward import TERMS
 from solver import Circle, Scene, Status
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
@@ -68,7 +69,9 @@ def test_flat_observation_concatenates_the_dict(env_id):
     flat, _ = make(env_id, obs_mode="flat").reset(seed=5)
     entries, _ = make(env_id, obs_mode="dict").reset(seed=5)
     assert np.array_equal(flat, np.concatenate(list(entries.values())))
-    assert list(entries) == list(make(env_id).observation_space)
+    assert list(entries) == list(make(env_id, obs_mode="dict").observation_space)
+    slices = make(env_id).unwrapped.observation_slices
+    assert all(np.array_equal(flat[columns], entries[key]) for key, columns in slices.items())
 
 
 @EVERY_ID
@@ -85,7 +88,7 @@ def test_observations_stay_in_bounds_and_rewards_add_up(env_id, obs_mode):
             )
             steps += 1
             assert env.observation_space.contains(observation)
-            assert reward == pytest.approx(sum(info["reward_terms"].values()), abs=1e-12)
+            assert reward == pytest.approx(sum(info[f"reward_{term}"] for term in TERMS), abs=1e-12)
             assert info["solver_status"] != Status.GAVE_UP
             assert info["cost"] >= 0
         assert steps == env.unwrapped.task.steps == gymnasium.spec(env_id).max_episode_steps
@@ -104,14 +107,15 @@ def test_forces_vanish_without_contact_and_are_copies(env_id):
 
 @EVERY_ID
 def test_a_steady_pull_reaches_every_set_point(env_id):
-    env = make(env_id)
+    env = make(env_id, obs_mode="dict")
+    regulated = "force_est" if env.unwrapped.settings.regulate == "estimate" else "force_true"
     for seed in range(20):
         observation, info = env.reset(seed=seed)
         pull = search(observation)
         reached, truncated = 0.0, False
         while reached < info["desired_force"] and not truncated:
             *_, truncated, info = env.step(pull)
-            reached = np.linalg.norm(info["force_true"])
+            reached = np.linalg.norm(info[regulated])
         assert reached >= info["desired_force"]
 
 
@@ -147,12 +151,14 @@ def test_bad_arguments_are_refused(kwargs, message):
 
 
 def test_given_scene_and_set_point_are_used():
-    env = make("CCR/PushObstacle-v0")
+    env = make("CCR/PushObstacle-v1", obs_mode="dict")
     scene = Scene([Circle(center=(44, 104), radius=15)])
     observation, info = env.reset(options={"scene": scene, "desired_force": 0.05})
     assert env.unwrapped.equilibrium.scene == scene
     assert info["desired_force"] == 0.05
-    assert observation["desired_force"] == pytest.approx(0.05 / FORCE_SCALE_N)
+    assert observation["desired_force"] == pytest.approx(0.05 / (FORCE_SPAN * 5000 / 180**2))
+    listed, _ = env.reset(options={"scene": list(scene), "desired_force": 0.05})
+    assert all(np.array_equal(listed[key], entry) for key, entry in observation.items())
     with pytest.raises(ValueError, match="both"):
         env.reset(options={"scene": scene})
     with pytest.raises(ValueError, match="desired_force"):
@@ -163,33 +169,33 @@ def test_arguments_are_json_able():
     kwargs = json.loads(
         json.dumps(
             {
-                "task": {"radius_mm": [12.0, 13.0]},
+                "task": {"radius": [0.07, 0.08]},
                 "robot": {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0},
                 "weights": {"effort": 0.0},
             }
         )
     )
-    env = make("CCR/PushObstacle-v0", **kwargs)
+    env = make("CCR/PushObstacle-v1", obs_mode="dict", **kwargs)
     observation, _ = env.reset(seed=0)
     assert observation["nodes"].shape == (39,)
-    assert 12 <= env.unwrapped.equilibrium.scene.obstacles[0].radius <= 13
+    assert 12.6 <= env.unwrapped.equilibrium.scene.obstacles[0].radius <= 14.4
 
 
 def test_an_infeasible_task_names_the_remedy():
-    env = make("CCR/LoadCell-v0", task={"force_n": [0.1, 0.2], "distance_mm": [170.0, 179.0]})
+    env = make("CCR/LoadCell-v1", task={"force": [1.0, 1.5], "distance": [0.95, 0.99]})
     with pytest.raises(RuntimeError, match="widen"):
         env.reset(seed=0)
 
 
 def test_without_force_sensor_only_the_estimate_is_observed():
-    env = make("CCR/PushObstacle-v0", force_sensor=False)
+    env = make("CCR/PushObstacle-v1", force_sensor=False, obs_mode="dict")
     observation, _ = env.reset(seed=0)
     assert "force_est" in observation
     assert not {"force_measured", "force_error"} & observation.keys()
 
 
 def test_the_reference_backend_agrees():
-    native, reference = (make("CCR/PushObstacle-v0", backend=backend) for backend in ("native", "casadi"))
+    native, reference = (make("CCR/PushObstacle-v1", backend=backend) for backend in ("native", "casadi"))
     scene = Scene([Circle(center=(44, 104), radius=15)])
     for env in (native, reference):
         env.reset(options={"scene": scene, "desired_force": 0.05})

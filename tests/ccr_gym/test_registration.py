@@ -25,7 +25,7 @@ def test_ids_make_the_exported_classes(env_id):
 
 @EVERY_ID
 def test_specs_survive_json(env_id):
-    env = gymnasium.make(env_id, task={"force_n": [0.05, 0.06]}, obs_mode="flat", sensing="realistic")
+    env = gymnasium.make(env_id, task={"force": [0.5, 0.6]}, obs_mode="flat", sensing="realistic")
     again = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
     assert again.unwrapped.task == env.unwrapped.task
     assert again.unwrapped.settings == env.unwrapped.settings
@@ -34,7 +34,7 @@ def test_specs_survive_json(env_id):
 
 @EVERY_ID
 def test_vector_environments_take_the_kwargs_of_single_ones(env_id):
-    kwargs = {"task": {"force_n": [0.05, 0.06]}, "force_sensor": False}
+    kwargs = {"task": {"force": [0.5, 0.6]}, "force_sensor": False}
     env, vector = gymnasium.make(env_id, **kwargs).unwrapped, gymnasium.make_vec(env_id, 2, **kwargs)
     assert (env.task, env.settings) == (vector.task, vector.settings)
 
@@ -48,7 +48,7 @@ def test_classes_need_no_registration():
 
 def test_the_name_of_another_task_is_refused():
     with pytest.raises(ValueError, match="task_name is 'LoadCell'; it must be 'PushObstacle'"):
-        gymnasium.make("CCR/PushObstacle-v0", task_name="LoadCell")
+        gymnasium.make("CCR/PushObstacle-v1", task_name="LoadCell")
     with pytest.raises(ValueError, match="task_name is 'Push'; it must be 'LoadCell' or"):
         ccr_gym.make_vector_env("Push")
 
@@ -57,8 +57,8 @@ def test_the_name_of_another_task_is_refused():
 def test_help_prints_the_docstring_with_the_numbers_of_the_fields(env_id):
     env_class = ccr_gym.ENV_IDS[env_id]
     text = " ".join(pydoc.plain(pydoc.render_doc(env_class)).replace("|", "").split())
-    low, high = (f"{1000 * force:g}" for force in env_class.task_class().force_n)
-    assert f"{low}–{high} mN" in text
+    low, high = env_class.task_class().force
+    assert f"{low:.3g}–{high:.3g} EI/L²" in text
     for field in fields(ccr_gym.RewardWeights):
         assert re.search(rf"`{field.name}` −?{field.default:g} ", text)
     assert f"truncated after {gymnasium.spec(env_id).max_episode_steps} steps" in text

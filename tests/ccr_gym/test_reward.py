@@ -23,9 +23,9 @@ def test_reward_is_largest_at_the_set_point():
 def test_each_term_measures_what_it_names():
     assert terms(0.12)["overshoot"] == pytest.approx(-0.1)
     assert terms(0.08)["overshoot"] == 0
-    assert terms(0.0, clearance=50.0)["approach"] == pytest.approx(-0.5)
-    assert terms(0.0, clearance=500.0)["approach"] == -1
-    assert terms(0.1, clearance=50.0)["approach"] == 0
+    assert terms(0.0, clearance=5 / 18)["approach"] == pytest.approx(-0.5)
+    assert terms(0.0, clearance=5.0)["approach"] == -1
+    assert terms(0.1, clearance=5 / 18)["approach"] == 0
     assert terms(0.1, effort=1.0)["effort"] == pytest.approx(-0.02)
     assert terms(10.0)["force_error"] == -1
 

@@ -4,15 +4,15 @@ import gymnasium
 import numpy as np
 import pytest
 
-from ccr_gym import FORCE_SCALE_N, SpatialPushEnv
+from ccr_gym import FORCE_SPAN, SpatialPushEnv
 from solver import Circle, Scene
-from solver.spatial import Cylinder, SpatialRobot, Sphere
+from solver.spatial import Cylinder, Sphere
 
 VECTOR = {"task": {"force_vector": True}}
 
 
 def make(**kwargs):
-    return gymnasium.make("CCR/SpatialPush-v0", disable_env_checker=True, **kwargs)
+    return gymnasium.make("CCR/SpatialPush-v1", disable_env_checker=True, **{"obs_mode": "dict", **kwargs})
 
 
 def test_docstring_lists_the_indices_of_the_flat_observation():
@@ -46,21 +46,22 @@ def test_observation_matches_the_equilibrium():
         axes = observation["frames"].reshape(-1, 2, 3)
         assert axes[:, 0] == pytest.approx(equilibrium.frames[:, :, 0], abs=1e-6)
         assert axes[:, 1] == pytest.approx(equilibrium.frames[:, :, 2], abs=1e-6)
-        assert 10 * observation["cable"] == pytest.approx(equilibrium.cables_mm, abs=1e-6)
+        assert 14 * observation["cable"] == pytest.approx(equilibrium.cables_mm[:2], abs=1e-6)
     assert kinds == {Sphere, Cylinder}
 
 
 def test_vector_set_points_are_forces_that_a_ramp_ends_with():
     env = make(**VECTOR)
+    most = FORCE_SPAN * env.unwrapped.settings.scales.force_n
     for seed in range(5):
         observation, info = env.reset(seed=seed)
         goal = info["desired_force"]
         assert goal.shape == (3,)
-        assert 0.02 <= np.linalg.norm(goal) <= FORCE_SCALE_N
-        assert FORCE_SCALE_N * observation["desired_force"] == pytest.approx(goal, abs=1e-7)
-        assert FORCE_SCALE_N * observation["force_error"] == pytest.approx(goal, abs=1e-7)
+        assert 0.06 <= np.linalg.norm(goal) <= most
+        assert most * observation["desired_force"] == pytest.approx(goal, abs=1e-7)
+        assert most * observation["force_error"] == pytest.approx(goal, abs=1e-7)
         _, _, _, _, info = env.step(np.zeros(2, np.float32))
-        assert info["reward_terms"]["force_error"] == -1
+        assert info["reward_force_error"] == -1
     x, y, z = goal
     scene = env.unwrapped.equilibrium.scene
     observation, info = env.reset(options={"scene": scene, "desired_force": (x, y, z)})
@@ -70,8 +71,10 @@ def test_vector_set_points_are_forces_that_a_ramp_ends_with():
 
 
 def test_vector_environment_agrees_with_single_ones():
-    ours = gymnasium.make_vec("CCR/SpatialPush-v0", 3, vectorization_mode="vector_entry_point", **VECTOR)
-    theirs = gymnasium.make_vec("CCR/SpatialPush-v0", 3, vectorization_mode="sync", **VECTOR)
+    ours = gymnasium.make_vec(
+        "CCR/SpatialPush-v1", 3, vectorization_mode="vector_entry_point", obs_mode="dict", **VECTOR
+    )
+    theirs = gymnasium.make_vec("CCR/SpatialPush-v1", 3, vectorization_mode="sync", obs_mode="dict", **VECTOR)
     (our, our_infos), (their, their_infos) = ours.reset(seed=4), theirs.reset(seed=4)
     generator = np.random.default_rng(0)
     for _ in range(70):
@@ -85,9 +88,9 @@ def test_vector_environment_agrees_with_single_ones():
 
 
 def test_robot_and_backend_are_validated():
-    assert make().unwrapped.settings.robot == SpatialRobot.prototype(model="paper")
+    assert len(make().unwrapped.settings.robot.cables) == 4
     robot = {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0, "angle": 2.0, "between": 1}
-    observation, _ = make(robot=robot, obs_mode="dict").reset(seed=0)
+    observation, _ = make(robot=robot, model="paper").reset(seed=0)
     assert observation["nodes"].shape == (39,)
     with pytest.raises(ValueError, match="in space it must be 'native'"):
         make(backend="casadi")

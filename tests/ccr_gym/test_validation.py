@@ -10,7 +10,7 @@ import pytest
 import ccr_gym
 from ccr_gym import RewardWeights, Sensing
 
-PUSH = "CCR/PushObstacle-v0"
+PUSH = "CCR/PushObstacle-v1"
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 NAN, INF = float("nan"), float("inf")
 
@@ -26,46 +26,46 @@ def make_vec(env_id=PUSH, count=3, **kwargs):
 @pytest.mark.parametrize(
     ("env_id", "task", "message"),
     [
-        (PUSH, {"force_n": (0.0, -0.1)}, r"force_n is \(0.0, -0.1\); it must be two numbers from 5e-07 to 0.5"),
-        (PUSH, {"force_n": (0.0, 0.0)}, "force_n is"),
-        (PUSH, {"force_n": (0.1, 0.6)}, "to 0.5"),
-        (PUSH, {"force_n": (-0.1, 0.1)}, "force_n is"),
-        (PUSH, {"force_n": 0.1}, "two numbers"),
-        (PUSH, {"force_n": (0.1, True)}, "two numbers"),
-        (PUSH, {"force_n": (0.1, 0.2, 0.3)}, "two numbers"),
-        (PUSH, {"force_n": "ab"}, "two numbers"),
-        (PUSH, {"force_n": (0.1, 0.1 + 0j)}, "two numbers"),
-        (PUSH, {"x_mm": (75, 35)}, r"x_mm is \(75, 35\).*the smaller one first"),
-        (PUSH, {"y_mm": (75, INF)}, "y_mm is"),
-        (PUSH, {"y_mm": (75, 10**400)}, "y_mm is"),
-        (PUSH, {"radius_mm": (-1, 12)}, "radius_mm is"),
-        (PUSH, {"radius_mm": (3, 12)}, "Circle.*could slip between points.*between=1"),
-        ("CCR/LoadCell-v0", {"distance_mm": (-51, -24)}, "distance_mm is"),
-        ("CCR/LoadCell-v0", {"height_mm": NAN}, "height_mm is nan"),
-        ("CCR/LoadCell-v0", {"height_mm": (1, 2)}, "height_mm is"),
-        ("CCR/TrackForce-v0", {"swing": (5, 5)}, r"swing is \(5, 5\).*from 0 to below 1"),
-        ("CCR/TrackForce-v0", {"swing": (0.5, 1)}, "swing is"),
-        ("CCR/TrackForce-v0", {"period": (0, 64)}, "period is.*from 1"),
-        ("CCR/TrackForce-v0", {"jumps": 2.5}, "jumps is 2.5; it must be a whole number from 0 to 128"),
-        ("CCR/TrackForce-v0", {"jumps": -1}, "jumps is -1"),
-        ("CCR/TrackForce-v0", {"jumps": True}, "jumps is True"),
-        ("CCR/TrackForce-v0", {"force_n": (0, 1)}, "force_n is"),
-        ("CCR/BracedPush-v0", {"brace_mm": ((38, 27), (75, 95), (10, 14))}, r"brace_mm\[0\] is"),
-        ("CCR/BracedPush-v0", {"goal_mm": ((52, 72), (125, 150), (0, 16))}, r"goal_mm\[2\] is"),
-        ("CCR/BracedPush-v0", {"goal_mm": ((52, 72), (125, 150))}, "3 ranges of two numbers"),
-        ("CCR/BracedPush-v0", {"brace_mm": ((27, 38), (75, 95), (1, 14))}, "could slip"),
-        ("CCR/SoftObstacle-v0", {"spring": (0, 0.1)}, "spring is"),
-        ("CCR/SoftObstacle-v0", {"spring": (0.1, INF)}, "spring is"),
-        ("CCR/InsertAndPush-v0", {"y_mm": (130, 75)}, "y_mm is"),
-        ("CCR/SpatialPush-v0", {"cylinder_fraction": 7}, "cylinder_fraction is 7; it must be a number from 0 to 1"),
-        ("CCR/SpatialPush-v0", {"max_tilt": -0.1}, "max_tilt is"),
-        ("CCR/SpatialPush-v0", {"max_ramp_angle": 2}, "max_ramp_angle is"),
-        ("CCR/SpatialPush-v0", {"distance_mm": (-1, 60)}, "distance_mm is"),
-        ("CCR/SpatialPush-v0", {"height_mm": (1, NAN)}, "height_mm is"),
-        ("CCR/SpatialPush-v0", {"radius_mm": (2.5, 16), "cylinder_fraction": 0}, "Sphere.*could slip"),
-        ("CCR/SpatialPush-v0", {"radius_mm": (2.5, 16), "cylinder_fraction": 1}, "Cylinder.*could slip"),
-        ("CCR/SpatialPush-v0", {"force_vector": "no"}, "force_vector is 'no'; it must be True or False"),
-        ("CCR/SpatialPush-v0", {"force_vector": 1}, "force_vector is 1"),
+        (PUSH, {"force": (0.0, -0.1)}, r"force is \(0.0, -0.1\); it must be two numbers from 1e-05 to 10"),
+        (PUSH, {"force": (0.0, 0.0)}, "force is"),
+        (PUSH, {"force": (0.1, 11)}, "to 10"),
+        (PUSH, {"force": (-0.1, 0.1)}, "force is"),
+        (PUSH, {"force": 0.1}, "two numbers"),
+        (PUSH, {"force": (0.1, True)}, "two numbers"),
+        (PUSH, {"force": (0.1, 0.2, 0.3)}, "two numbers"),
+        (PUSH, {"force": "ab"}, "two numbers"),
+        (PUSH, {"force": (0.1, 0.1 + 0j)}, "two numbers"),
+        (PUSH, {"x": (75, 35)}, r"x is \(75, 35\).*the smaller one first"),
+        (PUSH, {"y": (75, INF)}, "y is"),
+        (PUSH, {"y": (75, 10**400)}, "y is"),
+        (PUSH, {"radius": (-1, 12)}, "radius is"),
+        (PUSH, {"radius": (0.03, 0.07)}, "Circle.*could slip between points.*between=1"),
+        ("CCR/LoadCell-v1", {"distance": (-51, -24)}, "distance is"),
+        ("CCR/LoadCell-v1", {"height": NAN}, "height is nan"),
+        ("CCR/LoadCell-v1", {"height": (1, 2)}, "height is"),
+        ("CCR/TrackForce-v1", {"swing": (5, 5)}, r"swing is \(5, 5\).*from 0 to below 1"),
+        ("CCR/TrackForce-v1", {"swing": (0.5, 1)}, "swing is"),
+        ("CCR/TrackForce-v1", {"period": (0, 64)}, "period is.*from 1"),
+        ("CCR/TrackForce-v1", {"jumps": 2.5}, "jumps is 2.5; it must be a whole number from 0 to 128"),
+        ("CCR/TrackForce-v1", {"jumps": -1}, "jumps is -1"),
+        ("CCR/TrackForce-v1", {"jumps": True}, "jumps is True"),
+        ("CCR/TrackForce-v1", {"force": (0, 1)}, "force is"),
+        ("CCR/BracedPush-v1", {"brace": ((38, 27), (75, 95), (10, 14))}, r"brace\[0\] is"),
+        ("CCR/BracedPush-v1", {"goal": ((52, 72), (125, 150), (0, 16))}, r"goal\[2\] is"),
+        ("CCR/BracedPush-v1", {"goal": ((52, 72), (125, 150))}, "3 ranges of two numbers"),
+        ("CCR/BracedPush-v1", {"brace": ((0.15, 0.21), (0.4, 0.5), (0.006, 0.08))}, "could slip"),
+        ("CCR/SoftObstacle-v1", {"spring": (0, 0.1)}, "spring is"),
+        ("CCR/SoftObstacle-v1", {"spring": (0.1, INF)}, "spring is"),
+        ("CCR/InsertAndPush-v1", {"y": (130, 75)}, "y is"),
+        ("CCR/SpatialPush-v1", {"cylinder_fraction": 7}, "cylinder_fraction is 7; it must be a number from 0 to 1"),
+        ("CCR/SpatialPush-v1", {"max_tilt": -0.1}, "max_tilt is"),
+        ("CCR/SpatialPush-v1", {"max_ramp_angle": 2}, "max_ramp_angle is"),
+        ("CCR/SpatialPush-v1", {"distance": (-1, 60)}, "distance is"),
+        ("CCR/SpatialPush-v1", {"height": (1, NAN)}, "height is"),
+        ("CCR/SpatialPush-v1", {"radius": (0.014, 0.09), "cylinder_fraction": 0}, "Sphere.*could slip"),
+        ("CCR/SpatialPush-v1", {"radius": (0.014, 0.09), "cylinder_fraction": 1}, "Cylinder.*could slip"),
+        ("CCR/SpatialPush-v1", {"force_vector": "no"}, "force_vector is 'no'; it must be True or False"),
+        ("CCR/SpatialPush-v1", {"force_vector": 1}, "force_vector is 1"),
     ],
 )
 def test_invalid_tasks_are_refused(env_id, task, message):
@@ -91,9 +91,9 @@ def test_invalid_tasks_are_refused(env_id, task, message):
         ({"sensing": {"latency": (0, 8)}}, "latency is.*whole numbers from 0 to 7"),
         ({"sensing": {"latency": (False, 1)}}, "latency is"),
         ({"sensing": {"latency": 3}}, "latency is 3"),
-        ({"sensing": {"noise_n": (0, NAN)}}, "noise_n is"),
-        ({"sensing": {"backlash_mm": (-1, 1)}}, "backlash_mm is"),
-        ({"sensing": {"bias_n": "a"}}, "bias_n is 'a'"),
+        ({"sensing": {"noise": (0, NAN)}}, "noise is"),
+        ({"sensing": {"backlash": (-1, 1)}}, "backlash is"),
+        ({"sensing": {"bias": "a"}}, "bias is 'a'"),
         ({"max_increment_mm": NAN}, "max_increment_mm is nan"),
         ({"max_increment_mm": 15}, "max_increment_mm is 15.0; it must be at most 14, the cable_limit_mm"),
         ({"cable_limit_mm": INF}, "cable_limit_mm is inf"),
@@ -105,6 +105,10 @@ def test_invalid_tasks_are_refused(env_id, task, message):
         ({"obs_mode": None}, "obs_mode is None; it must be 'dict' or 'flat'"),
         ({"obs_mode": np.zeros(2)}, "obs_mode is"),
         ({"backend": ["native"]}, "backend is"),
+        ({"estimator": "best"}, "estimator is 'best'; it must be 'contact' or 'paper'"),
+        ({"regulate": True}, "regulate is True; it must be 'true' or 'estimate'"),
+        ({"model": "beam"}, "model is 'beam'"),
+        ({"robot": "snake"}, "robot is 'snake'; it must be .* or one of prototype, three_cables"),
         ({"split": 1}, "split is 1; it must be 'all' or 'train' or 'test'"),
     ],
 )
@@ -118,14 +122,14 @@ def test_invalid_settings_are_refused(kwargs, message):
     ("kwargs", "message"),
     [
         ({"forse_limit": 1.0}, "does not take 'forse_limit'; it takes task, .*, force_limit, "),
-        ({"task": {"forse_n": (0.1, 0.2)}}, "task does not take 'forse_n'; it takes x_mm, y_mm, radius_mm, force_n"),
+        ({"task": {"forse": (0.1, 0.2)}}, "task does not take 'forse'; it takes x, y, radius, force"),
         ({"weights": {"forse_error": 1.0}}, "weights does not take 'forse_error'; it takes force_error, "),
         ({"sensing": {"latenzy": (1, 2)}}, "sensing does not take 'latenzy'; it takes latency, "),
         ({"robot": {"lenght_mm": 180.0}}, "robot does not take 'lenght_mm'; it takes length_mm, "),
         ({"task": {3: 4}}, "task does not take 3; it takes"),
         ({"task": "PushObstacle"}, "task is 'PushObstacle'; it must be a PushObstacle or a mapping of its fields"),
         ({"task": 0}, "task is 0"),
-        ({"robot": 180.0}, "robot is 180.0; it must be a Robot or a mapping of its fields"),
+        ({"robot": 180.0}, "robot is 180.0; it must be a Robot, a mapping of its fields, or the name of a preset"),
         ({"weights": [1, 1]}, r"weights is \[1, 1\]; it must be a RewardWeights or a mapping"),
         ({"sensing": None}, "sensing is None; it must be 'ideal', 'realistic' or the fields of a Sensing"),
     ],
@@ -178,12 +182,12 @@ def test_numpy_numbers_are_accepted():
         max_episode_steps=np.uint8(9),
         estimator_friction=np.float32(0.5),
         force_sensor=np.bool_(False),
-        task={"radius_mm": np.array([12, 13]), "force_n": [np.float64(0.1), np.float32(0.25)]},
+        task={"radius": np.array([0.07, 0.08]), "force": [np.float64(0.5), np.float32(1.25)]},
     )
-    assert env.reset(seed=np.uint16(3))[0]["nodes"].shape == (2, 57)
+    assert env.reset(seed=np.uint16(3))[0].shape == (2, 99)
     assert (env.max_episode_steps, env.settings.estimator_friction, env.settings.force_sensor) == (9, 0.5, False)
-    assert env.task.radius_mm == (12.0, 13.0)
-    assert all(type(end) is float for end in env.task.force_n)
+    assert env.task.radius == (0.07, 0.08)
+    assert all(type(end) is float for end in env.task.force)
 
 
 def test_every_field_declares_a_check():

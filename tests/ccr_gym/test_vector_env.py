@@ -82,7 +82,7 @@ def test_results_do_not_depend_on_threads(env_id):
 
 
 def test_unseeded_episodes_differ():
-    env = gymnasium.make_vec("CCR/PushObstacle-v0", 3, vectorization_mode="vector_entry_point")
+    env = gymnasium.make_vec("CCR/PushObstacle-v1", 3, vectorization_mode="vector_entry_point", obs_mode="dict")
     first, _ = env.reset()
     again, _ = env.reset()
     assert len(set(first["desired_force"].ravel())) == 3
@@ -99,7 +99,7 @@ def test_unseeded_episodes_differ():
     ],
 )
 def test_bad_resets_are_refused(arguments, message):
-    env = gymnasium.make_vec("CCR/PushObstacle-v0", 3, vectorization_mode="vector_entry_point")
+    env = gymnasium.make_vec("CCR/PushObstacle-v1", 3, vectorization_mode="vector_entry_point", obs_mode="dict")
     env.reset(seed=0)
     with pytest.raises(ValueError, match=message):
         env.reset(**arguments)
@@ -107,7 +107,7 @@ def test_bad_resets_are_refused(arguments, message):
 
 def test_bad_actions_are_refused_and_change_nothing():
     env, twin = (
-        gymnasium.make_vec("CCR/PushObstacle-v0", 3, vectorization_mode="vector_entry_point") for _ in range(2)
+        gymnasium.make_vec("CCR/PushObstacle-v1", 3, vectorization_mode="vector_entry_point") for _ in range(2)
     )
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         env.step(np.zeros((3, 1)))
