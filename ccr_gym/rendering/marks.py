@@ -1,19 +1,63 @@
-"""Marks that pictures of the plane and of space share: contacts, force arrows and their legend."""
+"""Marks that pictures of the plane and of space share: contacts, forces, springs and labels of obstacles."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ccr_gym.rendering.camera import Camera, Strokes
 from ccr_gym.rendering.canvas import Canvas
-from ccr_gym.rendering.palette import LAYOUT, PALETTE, Color
+from ccr_gym.rendering.frame import Frame
+from ccr_gym.rendering.page import Region
+from ccr_gym.rendering.palette import LAYOUT, PALETTE, Color, contact_color
+from ccr_gym.rendering.units import length_text
+from solver import Equilibrium, Obstacle
+from solver.spatial import SpatialEquilibrium
+
+Projection = Callable[[np.ndarray], np.ndarray]  # of world points (…, d) on the canvas (…, 2)
+LEAST_PART = 1e-9  # of EI/(aL): smaller tensions are those of a slack cable
+COILS = 5
 
 
-def draw_marker(canvas: Canvas, at: ArrayLike) -> None:
+def draw_marker(canvas: Canvas, at: ArrayLike, radius: float, color: Color) -> None:
     """Draw a contact marker."""
-    canvas.disc(at, LAYOUT.contact, PALETTE.panel)
-    canvas.disc(at, LAYOUT.contact - 1, PALETTE.contact)
-    canvas.disc(at, LAYOUT.contact - 3.5, PALETTE.panel)
+    canvas.disc(at, radius + 1.2, PALETTE.panel)
+    canvas.disc(at, radius, color)
+
+
+def draw_contacts(
+    canvas: Canvas, project: Projection, frame: Frame, equilibrium: Equilibrium | SpatialEquilibrium, strokes: Strokes
+) -> None:
+    """Draw a marker on each point in contact, darker the larger its force, the multiplier times the energy scale."""
+    forces = equilibrium.energy_scale * equilibrium.multipliers.max(axis=0, initial=0.0)
+    points, touching = equilibrium.points, forces > 0
+    for order in np.argsort(forces[touching], kind="stable"):
+        point, force = points[touching][order], float(forces[touching][order])
+        draw_marker(canvas, project(point), strokes.marker, contact_color(force / frame.force_scale))
+
+
+def draw_forces(
+    canvas: Canvas, project: Projection, frame: Frame, equilibrium: Equilibrium | SpatialEquilibrium, full_mm: float
+) -> None:
+    """Draw arrows of the true and estimated force on the obstacles side by side, from the mean contact point."""
+    chosen = slice(None) if frame.target is None else slice(frame.target, frame.target + 1)
+    weights = equilibrium.multipliers[chosen].sum(axis=0).ravel()
+    if not weights.any():
+        return
+    start = np.average(equilibrium.points.reshape(weights.size, -1), axis=0, weights=weights)
+    first = project(start)
+    arrows = [
+        project(start - full_mm * scaled_force(force, frame.force_scale)) - first
+        for force in (frame.force_true, frame.force_est)
+    ]
+    along = arrows[0] if math.hypot(*arrows[0]) > 1 else arrows[1]
+    side = np.array([-along[1], along[0]]) / max(math.hypot(*along), 1.0)
+    for shift, vector, width, color in (
+        (-0.5 * LAYOUT.arrow - 0.3, arrows[0], LAYOUT.arrow, PALETTE.force_true),
+        (0.5 * LAYOUT.arrow_slim + 1.5, arrows[1], LAYOUT.arrow_slim, PALETTE.force_est),
+    ):
+        draw_arrow(canvas, first + shift * side, vector, width, color)
 
 
 def scaled_force(force: np.ndarray, full_scale: float) -> np.ndarray:
@@ -39,14 +83,66 @@ def draw_arrow(canvas: Canvas, start: ArrayLike, vector: np.ndarray, width: floa
     canvas.polygon(shape, color)
 
 
-def draw_legend(canvas: Canvas) -> None:
-    """Draw the legend of lines, markers and arrows at the top left."""
-    left, right, top, row = LAYOUT.margin, LAYOUT.margin + LAYOUT.glyph, LAYOUT.margin + 4, LAYOUT.row
-    canvas.line([(left, top), (right, top)], LAYOUT.backbone, PALETTE.backbone)
-    canvas.line([(left, top + row), (right, top + row)], LAYOUT.cable, PALETTE.cable)
-    draw_marker(canvas, (0.5 * (left + right), top + 2 * row))
-    sample = np.array([LAYOUT.glyph, 0.0])
-    draw_arrow(canvas, (left, top + 3 * row), sample, LAYOUT.arrow, PALETTE.force_true)
-    draw_arrow(canvas, (left, top + 4 * row), sample, LAYOUT.arrow_slim, PALETTE.force_est)
-    for index, name in enumerate(("backbone", "cable", "contact", "force, true", "force, estimated")):
-        canvas.label(name, (right + 10, top + index * row), PALETTE.ink)
+def draw_spring(canvas: Canvas, anchor: np.ndarray, moved: np.ndarray) -> None:
+    """Draw a spring between where an obstacle rests and where it is, both on the canvas."""
+    along = moved - anchor
+    length = math.hypot(*along)
+    if length > 2:
+        side = np.array([-along[1], along[0]]) / length
+        parts = (np.arange(2 * COILS) + 0.5) / (2 * COILS)
+        swing = 6.0 * np.where(np.arange(2 * COILS) % 2 == 0, 1.0, -1.0)
+        coil = anchor + parts[:, None] * along + swing[:, None] * side
+        canvas.line(np.vstack([anchor, coil, moved]), 1.6, PALETTE.spring)
+        canvas.disc(moved, 2.5, PALETTE.spring)
+    canvas.disc(anchor, 4.5, PALETTE.spring)
+    canvas.disc(anchor, 2.5, PALETTE.panel)
+
+
+def obstacle_notes(obstacle: Obstacle, moved_mm: float) -> list[str]:
+    """Return what is to be written at an obstacle: how far its spring gave way, and which nodes alone it stops."""
+    notes = [f"on a spring, moved {length_text(moved_mm)}"] if obstacle.spring is not None else []
+    if obstacle.nodes is None:
+        return notes
+    names = ", ".join(map(str, obstacle.nodes))
+    if len(obstacle.nodes) > 3:
+        names = f"{min(obstacle.nodes)} … {max(obstacle.nodes)}, {len(obstacle.nodes)} in all,"
+    return [f"stops node{'s' * (len(obstacle.nodes) > 1)} {names} only", *notes]
+
+
+def draw_notes(canvas: Canvas, notes: list[str], at: ArrayLike, world: Region, align: float = 0.5) -> None:
+    """Write notes below each other, from a place on."""
+    x, y = np.asarray(at, dtype=float).tolist()
+    for row, note in enumerate(notes):
+        canvas.label(note, (x, y + 16 * row), PALETTE.ink, align, LAYOUT.small_font, world)
+
+
+def draw_scale_bar(canvas: Canvas, camera: Camera, world: Region) -> None:
+    """Draw a bar of a tenth of the robot's length at the lower left of the world."""
+    left, y, step = world.left + LAYOUT.margin, world.bottom - LAYOUT.margin, camera.units(LAYOUT.grid_part)
+    canvas.line([(left, y), (left + step, y)], 2, PALETTE.muted)
+    for x in (left, left + step):
+        canvas.line([(x, y - 4), (x, y + 4)], 2, PALETTE.muted)
+    text = length_text(LAYOUT.grid_part * camera.length_mm)
+    canvas.label(text, (left + step + 9, y), PALETTE.muted, size=LAYOUT.small_font, within=world)
+
+
+def taut(equilibrium: Equilibrium | SpatialEquilibrium) -> np.ndarray:
+    """Return which cables are under tension, ``(c,)`` bool."""
+    robot = equilibrium.robot
+    return np.asarray(equilibrium.tensions > LEAST_PART * robot.rigidity / (robot.offset_mm * robot.longest_mm))
+
+
+def disk_widths(nodes: int, thickness: float, spacing: float, strokes: Strokes) -> np.ndarray:
+    """Return the stroke of each disk, zero for those left out where all would merge, ``(nodes,)``.
+
+    Args:
+        nodes: Number of nodes.
+        thickness: Thickness of a disk on the canvas.
+        spacing: Distance between nodes on the canvas.
+        strokes: Strokes of the robot.
+    """
+    every = max(1, math.ceil(4.0 / max(spacing, 1e-3)))
+    widths = np.zeros(nodes)
+    widths[::every] = max(strokes.disk, thickness)
+    widths[:: 2 * every] = max(2 * strokes.disk, thickness)
+    return widths
