@@ -31,6 +31,8 @@ def draw_title(canvas: Canvas, frame: Frame, region: Region) -> None:
 
 def draw_legend(canvas: Canvas, frame: Frame, region: Region) -> None:
     """Draw the legend of lines, markers and arrows, evenly spread over a line."""
+    if not region.height:
+        return
     canvas.fill(region, PALETTE.panel)
     canvas.box(region.left, region.bottom - 1, region.width, 1, PALETTE.border)
     entries = legend_entries(frame)

@@ -1,8 +1,8 @@
 """The surface that pictures are drawn on."""
 
-import math
 import os
-from itertools import pairwise
+from collections.abc import Iterable
+from itertools import repeat
 from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -34,6 +34,11 @@ def import_pygame() -> ModuleType:
     return pygame
 
 
+def shorter_side(pixels: int) -> float:
+    """Return the units along the shorter side of a picture: fewer in small ones, whose text would be too small."""
+    return min(max(pixels / LAYOUT.least_unit, LAYOUT.smallest_side), LAYOUT.short_side)
+
+
 class Label(NamedTuple):
     """A line of text, vertically centred on ``at``; ``align`` is the fraction of its width to the left of ``at``."""
 
@@ -46,7 +51,7 @@ class Label(NamedTuple):
 
 
 class Canvas:
-    """A drawing surface whose shorter side is ``LAYOUT.short_side`` units long; origin top left, y down.
+    """A drawing surface whose shorter side is ``shorter_side`` units long; origin top left, y down.
 
     Shapes are drawn at ``LAYOUT.supersampling`` times the resolution and scaled down; text is added afterwards.
 
@@ -58,7 +63,7 @@ class Canvas:
     def __init__(self, pygame: ModuleType, size: tuple[int, int]) -> None:
         self._pygame = pygame
         self._size = size
-        self._unit = min(size) / LAYOUT.short_side
+        self._unit = min(size) / shorter_side(min(size))
         self._scale = self._unit * LAYOUT.supersampling
         self._surface = pygame.Surface([side * LAYOUT.supersampling for side in size], 0, 32)
         self._labels: list[Label] = []
@@ -84,28 +89,36 @@ class Canvas:
         middle = snap(np.asarray(center) * self._scale).tolist()
         self._pygame.draw.circle(self._surface, color, middle, max(int(snap(radius * self._scale)), 1))
 
-    def segment(self, start: np.ndarray, end: np.ndarray, width: float, color: Color) -> None:
-        """Draw a straight line with square ends."""
-        along = end - start
-        side = 0.5 * width * np.array([-along[1], along[0]]) / max(math.hypot(*along), 1e-9)
-        self.polygon([start + side, end + side, end - side, start - side], color)
+    def polygons(self, corners: np.ndarray, colors: Iterable[Color]) -> None:
+        """Fill polygons of as many corners each, ``(k, c, 2)``."""
+        for points, color in zip(snap(corners * self._scale).tolist(), colors, strict=False):
+            self._pygame.draw.polygon(self._surface, color, points)
+
+    def segments(self, starts: np.ndarray, ends: np.ndarray, width: float, color: Color) -> None:
+        """Draw straight lines with square ends, ``(k, 2)`` each."""
+        along = ends - starts
+        lengths = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
+        side = 0.5 * width * np.column_stack([-along[:, 1], along[:, 0]]) / lengths
+        self.polygons(np.stack([starts + side, ends + side, ends - side, starts - side], axis=1), repeat(color))
 
     def line(self, points: ArrayLike, width: float, color: Color) -> None:
         """Draw a polyline with round joints and ends, ``(k, 2)``."""
         path = np.asarray(points, dtype=float)
-        for start, end in pairwise(path):
-            self.segment(start, end, width, color)
-        for point in path:
-            self.disc(point, 0.5 * width, color)
+        self.segments(path[:-1], path[1:], width, color)
+        radius = max(int(snap(0.5 * width * self._scale)), 1)
+        for middle in snap(path * self._scale).tolist():
+            self._pygame.draw.circle(self._surface, color, middle, radius)
 
     def dashes(self, points: ArrayLike, width: float, color: Color, dash: float = 5.0) -> None:
         """Draw a dashed polyline, ``(k, 2)``."""
         path = np.asarray(points, dtype=float)
         lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-        for begin in np.arange(0.0, lengths[-1] - 0.1 * dash, 2 * dash):
-            ends = [np.interp([begin, begin + dash], lengths, path[:, axis]) for axis in (0, 1)]
-            start, end = np.transpose(ends)
-            self.segment(start, end, width, color)
+        starts = np.arange(0.0, lengths[-1] - 0.1 * dash, 2 * dash)
+        first, last = (
+            np.column_stack([np.interp(at, lengths, path[:, axis]) for axis in (0, 1)])
+            for at in (starts, starts + dash)
+        )
+        self.segments(first, last, width, color)
 
     def label(
         self,

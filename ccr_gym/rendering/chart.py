@@ -8,9 +8,9 @@ from ccr_gym.rendering.canvas import Canvas
 from ccr_gym.rendering.frame import Frame
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE, Color
-from ccr_gym.rendering.units import force_unit, round_ticks
+from ccr_gym.rendering.units import force_unit, round_step, round_ticks
 
-TICKS = 3
+TICKS = 5
 
 
 def draw_chart(canvas: Canvas, frame: Frame, chart: Region) -> None:
@@ -24,9 +24,13 @@ def draw_chart(canvas: Canvas, frame: Frame, chart: Region) -> None:
     span = max(count, LAYOUT.chart_steps) - 1
     draw_axes(canvas, frame, plot, count, span)
     true, estimate, desired = frame.histories
-    draw_history(canvas, desired, frame.force_scale, plot, span, 3.4, PALETTE.desired)
-    draw_history(canvas, estimate, frame.force_scale, plot, span, 1.6, PALETTE.force_est)
-    draw_history(canvas, true, frame.force_scale, plot, span, 1.6, PALETTE.force_true)
+    for history, width, color in (
+        (desired, 3.4, PALETTE.desired),
+        (estimate, 1.6, PALETTE.force_est),
+        (true, 1.6, PALETTE.force_true),
+    ):
+        if history is not None and len(history):
+            draw_history(canvas, np.asarray(history, dtype=float) / frame.force_scale, plot, span, width, color)
 
 
 def draw_axes(canvas: Canvas, frame: Frame, plot: Region, count: int, span: int) -> None:
@@ -39,22 +43,22 @@ def draw_axes(canvas: Canvas, frame: Frame, plot: Region, count: int, span: int)
         canvas.label(f"{tick:.4g}", (plot.left - 6, y), PALETTE.muted, 1, LAYOUT.small_font)
     canvas.box(plot.left, plot.bottom, plot.width, 1, PALETTE.muted)
     canvas.label(unit.name, (plot.right + 8, plot.top + 4), PALETTE.muted, 0, LAYOUT.small_font)
-    now = count - 1 if frame.step is None else frame.step
-    for step in round_ticks(span, 6).astype(int):
-        x = plot.left + step / span * plot.width
+    first = 0 if frame.step is None else frame.step - count + 1
+    for step in step_ticks(first, span):
+        x = plot.left + (step - first) / span * plot.width
         canvas.box(x - 0.5, plot.bottom, 1, 4, PALETTE.muted)
-        text = str(step - count + 1 + now)
-        canvas.label(text, (x, plot.bottom + 13), PALETTE.muted, 0.5, LAYOUT.small_font)
+        canvas.label(str(step), (x, plot.bottom + 13), PALETTE.muted, 0.5, LAYOUT.small_font)
     canvas.label("step", (plot.right + 8, plot.bottom + 13), PALETTE.muted, 0, LAYOUT.small_font)
 
 
-def draw_history(
-    canvas: Canvas, history: np.ndarray | None, full_scale: float, plot: Region, span: int, width: float, color: Color
-) -> None:
-    """Draw one line, clipped to the scale, with gaps where a number is not finite."""
-    if history is None or not len(history):
-        return
-    parts = np.asarray(history, dtype=float) / full_scale
+def step_ticks(first: int, span: int) -> list[int]:
+    """Return the round numbers of steps among those that the chart shows."""
+    every = max(1, round(round_step(span, 6)))
+    return list(range(-(-first // every) * every, first + span + 1, every))
+
+
+def draw_history(canvas: Canvas, parts: np.ndarray, plot: Region, span: int, width: float, color: Color) -> None:
+    """Draw forces over the full scale as a line, clipped to the scale, with gaps where a number is not finite."""
     x = plot.left + np.arange(len(parts)) / span * plot.width
     points = np.column_stack([x, plot.bottom - np.clip(parts, 0.0, 1.0) * plot.height])
     finite = np.isfinite(parts)

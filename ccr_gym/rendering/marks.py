@@ -18,6 +18,7 @@ from solver.spatial import SpatialEquilibrium
 Projection = Callable[[np.ndarray], np.ndarray]  # of world points (…, d) on the canvas (…, 2)
 LEAST_PART = 1e-9  # of EI/(aL): smaller tensions are those of a slack cable
 COILS = 5
+MOST_TURN = 0.15  # of a drawn piece of a rod [rad]
 
 
 def draw_marker(canvas: Canvas, at: ArrayLike, radius: float, color: Color) -> None:
@@ -38,9 +39,23 @@ def draw_contacts(
 
 
 def draw_forces(
-    canvas: Canvas, project: Projection, frame: Frame, equilibrium: Equilibrium | SpatialEquilibrium, full_mm: float
+    canvas: Canvas,
+    project: Projection,
+    frame: Frame,
+    equilibrium: Equilibrium | SpatialEquilibrium,
+    full_mm: float,
+    marker: float,
 ) -> None:
-    """Draw arrows of the true and estimated force on the obstacles side by side, from the mean contact point."""
+    """Draw arrows of the true and estimated force on the obstacles side by side, from the mean contact point.
+
+    Args:
+        canvas: The canvas.
+        project: The projection onto it.
+        frame: What is shown.
+        equilibrium: The robot among its obstacles.
+        full_mm: Length of the arrow of a force of the full scale [mm].
+        marker: Radius of the contact markers, from whose rim the arrows start.
+    """
     chosen = slice(None) if frame.target is None else slice(frame.target, frame.target + 1)
     weights = equilibrium.multipliers[chosen].sum(axis=0).ravel()
     if not weights.any():
@@ -52,7 +67,8 @@ def draw_forces(
         for force in (frame.force_true, frame.force_est)
     ]
     along = arrows[0] if math.hypot(*arrows[0]) > 1 else arrows[1]
-    side = np.array([-along[1], along[0]]) / max(math.hypot(*along), 1.0)
+    along = along / max(math.hypot(*along), 1.0)
+    first, side = first + marker * along, np.array([-along[1], along[0]])
     for shift, vector, width, color in (
         (-0.5 * LAYOUT.arrow - 0.3, arrows[0], LAYOUT.arrow, PALETTE.force_true),
         (0.5 * LAYOUT.arrow_slim + 1.5, arrows[1], LAYOUT.arrow_slim, PALETTE.force_est),
@@ -83,17 +99,28 @@ def draw_arrow(canvas: Canvas, start: ArrayLike, vector: np.ndarray, width: floa
     canvas.polygon(shape, color)
 
 
-def draw_spring(canvas: Canvas, anchor: np.ndarray, moved: np.ndarray) -> None:
-    """Draw a spring between where an obstacle rests and where it is, both on the canvas."""
+def draw_spring(canvas: Canvas, anchor: np.ndarray, moved: np.ndarray, aside: float, robot: np.ndarray) -> None:
+    """Draw a spring between where an obstacle rests and where it is.
+
+    Args:
+        canvas: The canvas.
+        anchor: Where it rests, on the canvas.
+        moved: Where it is.
+        aside: How far the spring is drawn from the line between both, which the arrows of forces cover.
+        robot: Nodes of the robot on the canvas, ``(k, 2)``; of both sides the spring takes the one farther from them.
+    """
     along = moved - anchor
     length = math.hypot(*along)
+    side = np.array([-along[1], along[0]]) / max(length, 1e-9)
+    sides = [shift * aside * side for shift in (1.0, -1.0)]
+    shift = max(sides, key=lambda shift: round(float(np.linalg.norm(robot - (anchor + shift), axis=1).min()), 3))
+    anchor, moved = anchor + shift, moved + shift
     if length > 2:
-        side = np.array([-along[1], along[0]]) / length
         parts = (np.arange(2 * COILS) + 0.5) / (2 * COILS)
         swing = 6.0 * np.where(np.arange(2 * COILS) % 2 == 0, 1.0, -1.0)
         coil = anchor + parts[:, None] * along + swing[:, None] * side
         canvas.line(np.vstack([anchor, coil, moved]), 1.6, PALETTE.spring)
-        canvas.disc(moved, 2.5, PALETTE.spring)
+        canvas.disc(moved, 2.8, PALETTE.spring)
     canvas.disc(anchor, 4.5, PALETTE.spring)
     canvas.disc(anchor, 2.5, PALETTE.panel)
 
@@ -103,13 +130,18 @@ def obstacle_notes(obstacle: Obstacle, moved_mm: float) -> list[str]:
     notes = [f"on a spring, moved {length_text(moved_mm)}"] if obstacle.spring is not None else []
     if obstacle.nodes is None:
         return notes
-    names = ", ".join(map(str, obstacle.nodes))
-    if len(obstacle.nodes) > 3:
-        names = f"{min(obstacle.nodes)} … {max(obstacle.nodes)}, {len(obstacle.nodes)} in all,"
-    return [f"stops node{'s' * (len(obstacle.nodes) > 1)} {names} only", *notes]
+    return [f"stops {nodes_text(obstacle.nodes)} only", *notes]
 
 
-def draw_notes(canvas: Canvas, notes: list[str], at: ArrayLike, world: Region, align: float = 0.5) -> None:
+def nodes_text(nodes: tuple[int, ...]) -> str:
+    """Return the names of nodes as text: of many their range, or their number."""
+    if len(nodes) <= 3:
+        return f"node{'s' * (len(nodes) > 1)} {', '.join(map(str, nodes))}"
+    first, last = min(nodes), max(nodes)
+    return f"nodes {first}–{last}" if last - first + 1 == len(nodes) else f"{len(nodes)} nodes"
+
+
+def draw_notes(canvas: Canvas, notes: list[str], at: ArrayLike, world: Region, align: float) -> None:
     """Write notes below each other, from a place on."""
     x, y = np.asarray(at, dtype=float).tolist()
     for row, note in enumerate(notes):
@@ -132,7 +164,7 @@ def taut(equilibrium: Equilibrium | SpatialEquilibrium) -> np.ndarray:
     return np.asarray(equilibrium.tensions > LEAST_PART * robot.rigidity / (robot.offset_mm * robot.longest_mm))
 
 
-def disk_widths(nodes: int, thickness: float, spacing: float, strokes: Strokes) -> np.ndarray:
+def disk_widths(nodes: int, thickness: float, spacing: float, strokes: Strokes, least: float = 4.0) -> np.ndarray:
     """Return the stroke of each disk, zero for those left out where all would merge, ``(nodes,)``.
 
     Args:
@@ -140,9 +172,31 @@ def disk_widths(nodes: int, thickness: float, spacing: float, strokes: Strokes) 
         thickness: Thickness of a disk on the canvas.
         spacing: Distance between nodes on the canvas.
         strokes: Strokes of the robot.
+        least: Least distance between drawn disks on the canvas.
     """
-    every = max(1, math.ceil(4.0 / max(spacing, 1e-3)))
+    every = max(1, math.ceil(least / max(spacing, 1e-3)))
     widths = np.zeros(nodes)
     widths[::every] = max(strokes.disk, thickness)
     widths[:: 2 * every] = max(2 * strokes.disk, thickness)
     return widths
+
+
+def smooth_path(points: np.ndarray, headings: np.ndarray, segment_mm: float) -> np.ndarray:
+    """Return points of the curve of a rod, whose segments are arcs, as cubics through its nodes.
+
+    Args:
+        points: Nodes, ``(n+1, d)`` [mm].
+        headings: Unit tangents there, ``(n+1, d)``.
+        segment_mm: Length of a segment [mm].
+    """
+    turns = np.linalg.norm(np.diff(headings, axis=0), axis=1).max()
+    count = min(max(1, math.ceil(turns / MOST_TURN - 1e-6)), 12)
+    t = (np.arange(count) / count)[:, None, None]
+    start, end, out, into = points[:-1], points[1:], segment_mm * headings[:-1], segment_mm * headings[1:]
+    curve = (
+        (1 + 2 * t) * (1 - t) ** 2 * start
+        + t**2 * (3 - 2 * t) * end
+        + t * (1 - t) ** 2 * out
+        + t**2 * (t - 1) * into
+    )
+    return np.vstack([np.moveaxis(curve, 0, 1).reshape(-1, points.shape[1]), points[-1:]])

@@ -13,9 +13,9 @@ from solver import Circle, Equilibrium, HalfPlane, Obstacle
 def draw_obstacles(canvas: Canvas, camera: Camera, equilibrium: Equilibrium) -> None:
     """Draw the obstacles where they are, and dashed where those on springs rest."""
     for rest, obstacle in zip(equilibrium.scene, equilibrium.scene_now, strict=True):
-        if rest.spring is not None and not isinstance(rest, HalfPlane):
-            canvas.dashes(camera(_closed(rest.outline())), 1.2, PALETTE.spring)
         draw_obstacle(canvas, camera, obstacle, equilibrium)
+        if rest.spring is not None:
+            canvas.dashes(camera(_rest_line(rest, equilibrium)), 1.2, PALETTE.spring)
 
 
 def draw_obstacle(canvas: Canvas, camera: Camera, obstacle: Obstacle, equilibrium: Equilibrium) -> None:
@@ -61,21 +61,27 @@ def draw_load_cell(canvas: Canvas, camera: Camera, cell: HalfPlane, equilibrium:
 
     The pad is no longer than what it stops, and the rest is light: the robot's other nodes pass by the load cell.
     """
-    inward, along = cell.axes
-    nodes = equilibrium.nodes[list(cell.nodes or ()), :2]
-    heights = (nodes - cell.point) @ along
+    _, along = cell.axes
+    points = stopped_points(cell, equilibrium)
+    heights = (points - cell.point) @ along
     center = np.asarray(cell.point) + 0.5 * (heights.min() + heights.max()) * along
     plate = LAYOUT.plate_part * equilibrium.robot.longest_mm
-    pad = max(float(np.ptp(heights)), 0.0) + 0.4 * plate
     light = mix(PALETTE.background, PALETTE.outline, 0.35)
     for width, near, far, color in (
         (0.12 * plate, 0.12 * plate, 0.55 * plate, light),
         (0.75 * plate, 0.55 * plate, 1.15 * plate, light),
-        (pad, 0.0, 0.12 * plate, PALETTE.clamp),
+        (float(np.ptp(heights)) + 0.5 * plate, 0.0, 0.12 * plate, PALETTE.clamp),
     ):
         canvas.polygon(surface_box(camera, cell, center, width, near, far), color)
-    for node in nodes:
-        canvas.dashes(camera([node, cell.nearest(node)]), 1.2, PALETTE.muted, 3.0)
+    for point in points:
+        canvas.dashes(camera([point, cell.nearest(point)]), 1.2, PALETTE.muted, 3.0)
+
+
+def stopped_points(cell: HalfPlane, equilibrium: Equilibrium) -> np.ndarray:
+    """Return the point nearest to a load cell of each node that it stops, ``(k, 2)`` [mm]."""
+    positions = (equilibrium.robot.between + 1) * np.array(cell.nodes)
+    points = equilibrium.points[:, positions]
+    return np.asarray(points[cell.gap(points).argmin(axis=0), np.arange(len(positions))])
 
 
 def surface_box(
@@ -88,30 +94,36 @@ def surface_box(
 
 
 def draw_springs_and_notes(canvas: Canvas, camera: Camera, equilibrium: Equilibrium, world: Region) -> None:
-    """Draw the springs of obstacles, and write what is to be known of each obstacle below it."""
+    """Draw the springs of obstacles, and write what is to be known of each obstacle below it, off the robot."""
     for rest, obstacle, moved in zip(equilibrium.scene, equilibrium.scene_now, equilibrium.displacements, strict=True):
-        before, now = (_middle(each, equilibrium) for each in (rest, obstacle))
+        middle, low = note_place(obstacle, equilibrium)
         if rest.spring is not None:
-            draw_spring(canvas, camera(before), camera(now))
-        below = obstacle.outline()[:, 1].min() if not isinstance(obstacle, HalfPlane) else now[1] - _half_body(camera)
+            aside = 0.6 * (0.0 if isinstance(obstacle, HalfPlane) else obstacle.extent.inradius * camera.scale)
+            draw_spring(canvas, camera(middle - moved), camera(middle), aside, camera(equilibrium.nodes[:, :2]))
         notes = obstacle_notes(rest, float(np.linalg.norm(moved)))
-        draw_notes(canvas, notes, camera((now[0], below)) + (0.0, 14.0), world)
+        side = -1.0 if middle[0] < 0 else 1.0
+        at = camera((middle[0], low)) + (-0.5 * side * camera.units(LAYOUT.plate_part), 14.0)
+        draw_notes(canvas, notes, at, world, align=0.5 - 0.5 * side)
 
 
-def _half_body(camera: Camera) -> float:
-    return 0.5 * LAYOUT.plate_part * camera.length_mm
-
-
-def _middle(obstacle: Obstacle, equilibrium: Equilibrium) -> np.ndarray:
-    """Return the centre of an obstacle, or of a flat one the place of its surface that the robot can meet."""
+def note_place(obstacle: Obstacle, equilibrium: Equilibrium) -> tuple[np.ndarray, float]:
+    """Return the middle of an obstacle, of a flat one that of what is drawn of it, and its lowest y [mm]."""
     if not isinstance(obstacle, HalfPlane):
-        return np.array(obstacle.extent.center)
-    nodes = equilibrium.nodes[:, :2] if obstacle.nodes is None else equilibrium.nodes[list(obstacle.nodes), :2]
-    return obstacle.nearest(nodes.mean(axis=0)) + _half_body_part(equilibrium) * obstacle.axes[0]
+        return np.array(obstacle.extent.center), float(obstacle.outline()[:, 1].min())
+    plate = LAYOUT.plate_part * equilibrium.robot.longest_mm
+    stopped = equilibrium.nodes[:, :2] if obstacle.nodes is None else stopped_points(obstacle, equilibrium)
+    middle = obstacle.nearest(stopped.mean(axis=0)) + 0.85 * plate * obstacle.axes[0]
+    return middle, float(middle[1] - 0.4 * plate)
 
 
-def _half_body_part(equilibrium: Equilibrium) -> float:
-    return 0.85 * LAYOUT.plate_part * equilibrium.robot.longest_mm
+def _rest_line(obstacle: Obstacle, equilibrium: Equilibrium) -> np.ndarray:
+    """Return the outline of an obstacle, of a flat one a line as long as the picture is high, ``(k, 2)`` [mm]."""
+    if not isinstance(obstacle, HalfPlane):
+        return _closed(obstacle.outline())
+    length = equilibrium.robot.longest_mm
+    reach = length if obstacle.nodes is None else 0.5 * LAYOUT.plate_part * length
+    middle = obstacle.nearest(note_place(obstacle, equilibrium)[0])
+    return middle + np.array([[-reach], [reach]]) * obstacle.axes[1]
 
 
 def _closed(outline: np.ndarray) -> np.ndarray:

@@ -45,12 +45,13 @@ class Page(NamedTuple):
 
     @classmethod
     def divide(cls, width: float, height: float, titled: bool, charted: bool) -> "Page":
-        """Divide a canvas of some size, with or without a title and a strip chart."""
+        """Divide a canvas of some size, with or without a title and a strip chart; a narrow one has no legend."""
         title, chart = titled * LAYOUT.title, charted * LAYOUT.chart
-        top, bottom, inner = title + LAYOUT.legend, height - LAYOUT.footer, width - LAYOUT.panel
+        legend = (width >= LAYOUT.legend_width) * LAYOUT.legend
+        top, bottom, inner = title + legend, height - LAYOUT.footer, width - LAYOUT.panel
         return cls(
             title=Region(0, 0, width, title),
-            legend=Region(0, title, width, LAYOUT.legend),
+            legend=Region(0, title, width, legend),
             world=Region(0, top, inner, bottom - chart - top),
             panel=Region(inner, top, LAYOUT.panel, bottom - top),
             chart=Region(0, bottom - chart, inner, chart),

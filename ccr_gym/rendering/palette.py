@@ -40,9 +40,12 @@ class Palette:
 
 @dataclass(frozen=True, slots=True)
 class PictureLayout:
-    """Dimensions: ``*_part`` over the robot's longest length, the rest in units, 640 of which span the shorter side."""
+    """Dimensions: ``*_part`` over the robot's longest length, the rest in units of the canvas, see ``short_side``."""
 
-    short_side: float = 640.0
+    short_side: float = 640.0  # of a picture, in units
+    smallest_side: float = 420.0  # the same of small pictures, which have no legend
+    least_unit: float = 0.75  # below which a picture is small [px]
+    legend_width: float = 600.0
     supersampling: int = 4
 
     reach_part: float = 0.86

@@ -5,7 +5,7 @@ import numpy as np
 from ccr_gym.rendering.camera import Bounds, Camera, Strokes, extent_points, planar_bounds, rail_part
 from ccr_gym.rendering.canvas import Canvas
 from ccr_gym.rendering.frame import Frame
-from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, taut
+from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, smooth_path, taut
 from ccr_gym.rendering.obstacles import draw_obstacles, draw_springs_and_notes
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE
@@ -25,7 +25,7 @@ def draw_plane(canvas: Canvas, frame: Frame, world: Region) -> None:
     draw_base(canvas, camera, equilibrium, strokes, world)
     draw_robot(canvas, camera, equilibrium, strokes)
     draw_springs_and_notes(canvas, camera, equilibrium, world)
-    draw_forces(canvas, camera, frame, equilibrium, LAYOUT.arrow_part * camera.length_mm)
+    draw_forces(canvas, camera, frame, equilibrium, LAYOUT.arrow_part * camera.length_mm, strokes.marker)
     draw_contacts(canvas, camera, frame, equilibrium, strokes)
     draw_scale_bar(canvas, camera, world)
 
@@ -95,4 +95,7 @@ def draw_robot(canvas: Canvas, camera: Camera, equilibrium: Equilibrium, strokes
         path, color = camera(equilibrium.pulled[index, : end + 1]), PALETTE.cable if tight[index] else PALETTE.slack
         canvas.line(path, strokes.cable, color)
         canvas.disc(path[-1], 1.2 * strokes.cable + 0.6, color)
-    canvas.line(camera(nodes[:, :2]), strokes.backbone, PALETTE.backbone)
+    path = nodes[:, :2]
+    if robot.model == "rod":
+        path = smooth_path(path, across @ [[0.0, 1.0], [-1.0, 0.0]], equilibrium.length_mm / robot.segments)
+    canvas.line(camera(path), strokes.backbone, PALETTE.backbone)

@@ -7,13 +7,13 @@ import numpy as np
 from ccr_gym.rendering.camera import Strokes
 from ccr_gym.rendering.canvas import Canvas
 from ccr_gym.rendering.frame import Frame
-from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, taut
+from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, smooth_path, taut
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE, mix
-from ccr_gym.rendering.surfaces import draw_shadow, draw_springs_and_notes, draw_surface, far_to_near
+from ccr_gym.rendering.surfaces import draw_shadow, draw_solid, draw_springs_and_notes, draw_wall, far_to_near
 from ccr_gym.rendering.view import NEAR, View, on_ground
 from solver.common.rod import full_cables
-from solver.spatial import SpatialEquilibrium
+from solver.spatial import HalfSpace, SpatialEquilibrium
 
 RINGS = (0.2, 0.4, 0.6, 0.8)  # over the robot's length
 TURNS = np.linspace(0, 2 * math.pi, 49)
@@ -27,12 +27,15 @@ def draw_space(canvas: Canvas, frame: Frame, world: Region) -> None:
     view = View.fit(equilibrium, world)
     strokes = Strokes.fit(equilibrium.robot.offset_mm * view.camera.scale)
     draw_ground(canvas, view, world)
+    for obstacle in equilibrium.scene_now:
+        if isinstance(obstacle, HalfSpace):
+            draw_wall(canvas, view, obstacle)
     draw_shadows(canvas, view)
     draw_base(canvas, view)
     hidden = draw_solids(canvas, view, strokes)
     draw_hidden(canvas, view, hidden)
     draw_springs_and_notes(canvas, view, world)
-    draw_forces(canvas, view, frame, equilibrium, LAYOUT.arrow_part * view.camera.length_mm)
+    draw_forces(canvas, view, frame, equilibrium, LAYOUT.arrow_part * view.camera.length_mm, strokes.marker)
     draw_contacts(canvas, view, frame, equilibrium, strokes)
     draw_scale_bar(canvas, view.camera, world)
 
@@ -82,7 +85,7 @@ def draw_solids(canvas: Canvas, view: View, strokes: Strokes) -> np.ndarray:
     left = np.ones(len(nodes) - 1, dtype=bool)
     for index in order:
         draw_robot(canvas, view, strokes, left & hidden[index])
-        draw_surface(canvas, view, obstacles[index])
+        draw_solid(canvas, view, obstacles[index])
         left &= ~hidden[index]
     draw_robot(canvas, view, strokes, left)
     return ~left
@@ -94,7 +97,7 @@ def draw_robot(canvas: Canvas, view: View, strokes: Strokes, chosen: np.ndarray)
     robot, nodes = equilibrium.robot, equilibrium.nodes
     cables = _cables(equilibrium)
     scale = view.camera.scale
-    widths = disk_widths(len(nodes), 0.0, robot.segment_mm * scale, strokes)
+    widths = disk_widths(len(nodes), 0.0, robot.segment_mm * scale, strokes, least=9.0)
     order = np.flatnonzero(chosen)
     for i in order[np.argsort((nodes[order] + nodes[order + 1]) @ NEAR, kind="stable")]:
         middle = 0.5 * (nodes[i] + nodes[i + 1])
@@ -103,7 +106,10 @@ def draw_robot(canvas: Canvas, view: View, strokes: Strokes, chosen: np.ndarray)
             if i + 1 < len(path):
                 color = view.faded(PALETTE.cable if tight else PALETTE.slack, path[i])
                 canvas.line(view(path[i : i + 2]), size * strokes.cable, color)
-        canvas.line(view(nodes[i : i + 2]), size * strokes.backbone, view.faded(PALETTE.backbone, middle))
+        path = nodes[i : i + 2]
+        if robot.model == "rod":
+            path = smooth_path(path, equilibrium.frames[i : i + 2, :, 2], robot.segment_mm)
+        canvas.line(view(path), size * strokes.backbone, view.faded(PALETTE.backbone, middle))
         if widths[i + 1]:
             rim = nodes[i + 1] + robot.offset_mm * CIRCLE @ equilibrium.frames[i + 1].T
             canvas.line(view(rim), 0.8 * size * widths[i + 1], view.faded(PALETTE.disk, nodes[i + 1]))

@@ -1,6 +1,7 @@
 """Obstacles of space, shaded, with shadows on the ground."""
 
 import math
+from itertools import repeat
 
 import numpy as np
 
@@ -15,30 +16,23 @@ from solver.spatial import HalfSpace
 LEAST_AREA = 1e-12  # of a face that has a normal, over the square of the robot's length
 DARK = mix(PALETTE.outline, PALETTE.ink, 0.35)
 BRIGHT = mix(PALETTE.obstacle, PALETTE.panel, 0.55)
-WALL_PART = 0.55  # half the side of the piece of a wall that is drawn, over the robot's length
+WALL_PART = 0.45  # half the side of the piece of a wall that is drawn, over the robot's length
 CELLS = 11
 
 
 def far_to_near(view: View) -> list[int]:
-    """Return the indices of the obstacles, those far from the viewer first; walls are behind all others."""
-    middles = [float(np.dot(obstacle.extent.center, NEAR)) for obstacle in view.equilibrium.scene_now]
-    walls = [isinstance(obstacle, HalfSpace) for obstacle in view.equilibrium.scene_now]
-    return sorted(range(len(middles)), key=lambda index: (not walls[index], middles[index]))
+    """Return the indices of the solid obstacles, those far from the viewer first; walls are not among them."""
+    depths = {
+        index: float(np.dot(obstacle.extent.center, NEAR))
+        for index, obstacle in enumerate(view.equilibrium.scene_now)
+        if not isinstance(obstacle, HalfSpace)
+    }
+    return sorted(depths, key=depths.__getitem__)
 
 
 def draw_shadow(canvas: Canvas, view: View, obstacle: Obstacle) -> None:
-    """Draw the shadow of a solid obstacle on the ground; a wall casts none."""
-    if not isinstance(obstacle, HalfSpace):
-        for face in view(on_ground(faces(obstacle.outline()))):
-            canvas.polygon(face, PALETTE.shadow)
-
-
-def draw_surface(canvas: Canvas, view: View, obstacle: Obstacle) -> None:
-    """Draw an obstacle."""
-    if isinstance(obstacle, HalfSpace):
-        draw_wall(canvas, view, obstacle)
-    else:
-        draw_solid(canvas, view, obstacle)
+    """Draw the shadow of a solid obstacle on the ground."""
+    canvas.polygons(view(on_ground(faces(obstacle.outline()))), repeat(PALETTE.shadow))
 
 
 def draw_solid(canvas: Canvas, view: View, obstacle: Obstacle) -> None:
@@ -49,29 +43,30 @@ def draw_solid(canvas: Canvas, view: View, obstacle: Obstacle) -> None:
     corners, normals = corners[sizes > smallest], normals[sizes > smallest] / sizes[sizes > smallest, None]
     middle = np.array(obstacle.extent.center)
     normals *= np.sign(np.sum((corners.mean(axis=1) - middle) * normals, axis=1))[:, None]  # outward
-    for face, normal in zip(corners, normals, strict=True):
-        if normal @ NEAR > 0:
-            shade = 0.5 + 0.5 * float(normal @ LIGHT)
-            color = mix(DARK, BRIGHT, shade if obstacle.nodes is None else 0.5 + 0.5 * shade)
-            canvas.polygon(view(face), view.faded(color, middle))
+    facing = normals @ NEAR > 0
+    shades = 0.5 + 0.5 * normals[facing] @ LIGHT
+    if obstacle.nodes is not None:
+        shades = 0.5 + 0.5 * shades
+    colors = (view.faded(mix(DARK, BRIGHT, shade), middle) for shade in shades.tolist())
+    canvas.polygons(view(corners[facing]), colors)
 
 
 def draw_wall(canvas: Canvas, view: View, wall: HalfSpace) -> None:
-    """Draw a square piece of a wall, filled behind the robot and as a grid in front of it; of a load cell its pad."""
+    """Draw a square piece of a wall: a grid, filled where it is behind the robot; of a load cell its pad."""
     middle, first, second = wall_axes(view, wall)
-    half = (WALL_PART if wall.nodes is None else 0.45 * LAYOUT.plate_part) * view.camera.length_mm
-    ends = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+    half = (WALL_PART if wall.nodes is None else 0.4 * LAYOUT.plate_part) * view.camera.length_mm
+    ends = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
     square = view(middle + ends @ np.array([first, second]))
-    behind = float(np.dot(wall.normal, NEAR)) > 0
-    if behind:
+    if wall.nodes is not None:
+        canvas.polygon(square, mix(PALETTE.clamp, PALETTE.background, 0.35))
+    elif np.dot(wall.normal, NEAR) > 0:
         shade = 0.5 + 0.5 * float(np.dot(wall.normal, LIGHT))
-        canvas.polygon(square, mix(PALETTE.outline, PALETTE.background, shade))
-    lines = CELLS if wall.nodes is None else 2
-    for part in np.linspace(-half, half, lines):
-        for start, end in (((part, -half), (part, half)), ((-half, part), (half, part))):
-            ends = np.array([start, end]) @ np.array([first, second])
-            canvas.line(view(middle + ends), 1.0 if wall.nodes is None else 2.0, PALETTE.hatch)
-    canvas.line(np.vstack([square, square[:1]]), 1.6, PALETTE.outline)
+        canvas.polygon(square, mix(PALETTE.obstacle, PALETTE.background, shade))
+    canvas.line(square, 1.6, PALETTE.outline)
+    if wall.nodes is None:
+        for part in np.linspace(-half, half, CELLS):
+            for across in (np.array([(part, -half), (part, half)]), np.array([(-half, part), (half, part)])):
+                canvas.line(view(middle + across @ np.array([first, second])), 1.0, PALETTE.hatch)
 
 
 def wall_axes(view: View, wall: HalfSpace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -86,19 +81,20 @@ def wall_axes(view: View, wall: HalfSpace) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def draw_springs_and_notes(canvas: Canvas, view: View, world: Region) -> None:
-    """Draw the springs of obstacles, and write what is to be known of each obstacle below it."""
+    """Draw the springs of obstacles, and write what is to be known of each obstacle below it, off the robot."""
     equilibrium = view.equilibrium
     for rest, obstacle, moved in zip(equilibrium.scene, equilibrium.scene_now, equilibrium.displacements, strict=True):
-        places = [wall_axes(view, o)[0] if isinstance(o, HalfSpace) else np.array(o.extent.center)
-                  for o in (rest, obstacle)]
-        before, now = view(places)
+        flat = isinstance(obstacle, HalfSpace)
+        middle = wall_axes(view, obstacle)[0] if isinstance(obstacle, HalfSpace) else np.array(obstacle.extent.center)
+        x, y = view(middle)
         if rest.spring is not None:
-            draw_spring(canvas, before, now)
-        if isinstance(obstacle, HalfSpace):
-            below = now[1] + view.camera.units(0.5 * LAYOUT.plate_part)
-        else:
-            below = float(view(obstacle.outline().reshape(-1, 3))[:, 1].max())
-        draw_notes(canvas, obstacle_notes(rest, float(np.linalg.norm(moved))), (now[0], below + 12.0), world)
+            aside = 0.6 * (0.0 if flat else obstacle.extent.inradius * view.camera.scale)
+            draw_spring(canvas, view(middle - moved), view(middle), aside, view(equilibrium.nodes))
+        half = view.camera.units(0.5 * LAYOUT.plate_part)
+        low = y + half if flat else view(obstacle.outline().reshape(-1, 3))[:, 1].max()
+        side = -1.0 if x < view.camera.x else 1.0
+        notes = obstacle_notes(rest, float(np.linalg.norm(moved)))
+        draw_notes(canvas, notes, (x - side * half, low + 12.0), world, align=0.5 - 0.5 * side)
 
 
 def faces(surface: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ UP = np.array([-math.sin(ELEVATION) * math.cos(AZIMUTH), -math.sin(ELEVATION) * 
 NEAR = np.cross(RIGHT, UP)
 LIGHT = (NEAR + 0.7 * UP - 0.5 * RIGHT) / np.linalg.norm(NEAR + 0.7 * UP - 0.5 * RIGHT)
 PLANE = np.column_stack([RIGHT, UP])  # of the picture
-FADE = 0.55  # part of a colour that is lost at the far end of a robot's reach
+FADE = 0.45  # part of a colour that is lost at the far end of a robot's reach
 SAMPLES = np.linspace(0.004, 2.0, 250)[:, None]  # along a line of sight, over the robot's length
 
 
