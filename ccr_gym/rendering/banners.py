@@ -96,7 +96,8 @@ def cables_text(cables_mm: np.ndarray, resolution_mm: float) -> str:
     """Return the displacements of all cables as text, or of many their range."""
     texts = [length_text(cable, resolution_mm, unit=False) for cable in cables_mm.tolist()]
     if len(texts) > MANY_CABLES:
-        low, high = (length_text(float(end), resolution_mm, unit=False) for end in (cables_mm.min(), cables_mm.max()))
-        return f"{len(texts)} cables from {low} to {length_text(float(cables_mm.max()), resolution_mm)}"
+        low, high = float(cables_mm.min()), float(cables_mm.max())
+        lowest = length_text(low, resolution_mm, unit=False)
+        return f"{len(texts)} cables from {lowest} to {length_text(high, resolution_mm)}"
     last = length_text(float(cables_mm[-1]), resolution_mm)
     return f"cable{'s' * (len(texts) > 1)} {', '.join([*texts[:-1], last])}"

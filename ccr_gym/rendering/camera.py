@@ -28,9 +28,7 @@ class Bounds(NamedTuple):
             return self
         grown = [_outward(side) for side in (*points.min(axis=0), *points.max(axis=0))]
         low_x, low_y, high_x, high_y = grown
-        return Bounds(
-            min(self.left, low_x), max(self.right, high_x), min(self.bottom, low_y), max(self.top, high_y)
-        )
+        return Bounds(min(self.left, low_x), max(self.right, high_x), min(self.bottom, low_y), max(self.top, high_y))
 
 
 def _outward(value: float) -> float:

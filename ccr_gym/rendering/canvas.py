@@ -60,6 +60,8 @@ class Canvas:
         size: Width and height of the finished picture [px].
     """
 
+    _fonts: "dict[float, pygame.font.Font]"
+
     def __init__(self, pygame: ModuleType, size: tuple[int, int]) -> None:
         self._pygame = pygame
         self._size = size
@@ -67,7 +69,7 @@ class Canvas:
         self._scale = self._unit * LAYOUT.supersampling
         self._surface = pygame.Surface([side * LAYOUT.supersampling for side in size], 0, 32)
         self._labels: list[Label] = []
-        self._fonts: dict[float, pygame.font.Font] = {}
+        self._fonts = {}
         self._surface.fill(PALETTE.background)
         self.region = Region(0.0, 0.0, size[0] / self._unit, size[1] / self._unit)
 

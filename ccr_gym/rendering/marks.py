@@ -1,7 +1,6 @@
 """Marks that pictures of the plane and of space share: contacts, forces, springs and labels of obstacles."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,13 +11,14 @@ from ccr_gym.rendering.frame import Frame
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE, Color, contact_color
 from ccr_gym.rendering.units import length_text
+from ccr_gym.rendering.view import View
 from solver import Equilibrium, Obstacle
 from solver.spatial import SpatialEquilibrium
 
-Projection = Callable[[np.ndarray], np.ndarray]  # of world points (…, d) on the canvas (…, 2)
+Projection = Camera | View  # of world points (…, d) on the canvas (…, 2)
 LEAST_PART = 1e-9  # of EI/(aL): smaller tensions are those of a slack cable
 COILS = 5
-MOST_TURN = 0.15  # of a drawn piece of a rod [rad]
+MOST_TURN = 0.08  # of a drawn piece of a rod [rad]
 
 
 def draw_marker(canvas: Canvas, at: ArrayLike, radius: float, color: Color) -> None:
@@ -194,9 +194,6 @@ def smooth_path(points: np.ndarray, headings: np.ndarray, segment_mm: float) -> 
     t = (np.arange(count) / count)[:, None, None]
     start, end, out, into = points[:-1], points[1:], segment_mm * headings[:-1], segment_mm * headings[1:]
     curve = (
-        (1 + 2 * t) * (1 - t) ** 2 * start
-        + t**2 * (3 - 2 * t) * end
-        + t * (1 - t) ** 2 * out
-        + t**2 * (t - 1) * into
+        (1 + 2 * t) * (1 - t) ** 2 * start + t**2 * (3 - 2 * t) * end + t * (1 - t) ** 2 * out + t**2 * (t - 1) * into
     )
     return np.vstack([np.moveaxis(curve, 0, 1).reshape(-1, points.shape[1]), points[-1:]])

@@ -93,16 +93,23 @@ def surface_box(
     return camera([center + across * width * along + depth * inward for across, depth in corners])
 
 
-def draw_springs_and_notes(canvas: Canvas, camera: Camera, equilibrium: Equilibrium, world: Region) -> None:
-    """Draw the springs of obstacles, and write what is to be known of each obstacle below it, off the robot."""
-    for rest, obstacle, moved in zip(equilibrium.scene, equilibrium.scene_now, equilibrium.displacements, strict=True):
-        middle, low = note_place(obstacle, equilibrium)
-        if rest.spring is not None:
+def draw_springs(canvas: Canvas, camera: Camera, equilibrium: Equilibrium) -> None:
+    """Draw the springs of obstacles, beside the arrows of forces."""
+    for obstacle, moved in zip(equilibrium.scene_now, equilibrium.displacements, strict=True):
+        if obstacle.spring is not None:
+            middle, _ = note_place(obstacle, equilibrium)
             aside = 0.6 * (0.0 if isinstance(obstacle, HalfPlane) else obstacle.extent.inradius * camera.scale)
             draw_spring(canvas, camera(middle - moved), camera(middle), aside, camera(equilibrium.nodes[:, :2]))
-        notes = obstacle_notes(rest, float(np.linalg.norm(moved)))
+
+
+def draw_all_notes(canvas: Canvas, camera: Camera, equilibrium: Equilibrium, world: Region) -> None:
+    """Write what is to be known of each obstacle below it, away from the robot."""
+    for obstacle, moved in zip(equilibrium.scene_now, equilibrium.displacements, strict=True):
+        middle, low = note_place(obstacle, equilibrium)
         side = -1.0 if middle[0] < 0 else 1.0
-        at = camera((middle[0], low)) + (-0.5 * side * camera.units(LAYOUT.plate_part), 14.0)
+        x, y = camera((middle[0], low))
+        notes = obstacle_notes(obstacle, float(np.linalg.norm(moved)))
+        at = x - 0.5 * side * camera.units(LAYOUT.plate_part), y + 14.0
         draw_notes(canvas, notes, at, world, align=0.5 - 0.5 * side)
 
 
@@ -123,7 +130,7 @@ def _rest_line(obstacle: Obstacle, equilibrium: Equilibrium) -> np.ndarray:
     length = equilibrium.robot.longest_mm
     reach = length if obstacle.nodes is None else 0.5 * LAYOUT.plate_part * length
     middle = obstacle.nearest(note_place(obstacle, equilibrium)[0])
-    return middle + np.array([[-reach], [reach]]) * obstacle.axes[1]
+    return np.asarray(middle + np.array([[-reach], [reach]]) * obstacle.axes[1])
 
 
 def _closed(outline: np.ndarray) -> np.ndarray:

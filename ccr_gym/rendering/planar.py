@@ -6,7 +6,7 @@ from ccr_gym.rendering.camera import Bounds, Camera, Strokes, extent_points, pla
 from ccr_gym.rendering.canvas import Canvas
 from ccr_gym.rendering.frame import Frame
 from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, smooth_path, taut
-from ccr_gym.rendering.obstacles import draw_obstacles, draw_springs_and_notes
+from ccr_gym.rendering.obstacles import draw_all_notes, draw_obstacles, draw_springs
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE
 from ccr_gym.rendering.units import length_text
@@ -23,8 +23,9 @@ def draw_plane(canvas: Canvas, frame: Frame, world: Region) -> None:
     draw_grid(canvas, camera, world)
     draw_obstacles(canvas, camera, equilibrium)
     draw_base(canvas, camera, equilibrium, strokes, world)
+    draw_springs(canvas, camera, equilibrium)
     draw_robot(canvas, camera, equilibrium, strokes)
-    draw_springs_and_notes(canvas, camera, equilibrium, world)
+    draw_all_notes(canvas, camera, equilibrium, world)
     draw_forces(canvas, camera, frame, equilibrium, LAYOUT.arrow_part * camera.length_mm, strokes.marker)
     draw_contacts(canvas, camera, frame, equilibrium, strokes)
     draw_scale_bar(canvas, camera, world)
