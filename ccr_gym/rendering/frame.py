@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver import Equilibrium
+from solver import Equilibrium, Obstacle, Scene
 from solver.spatial import SpatialEquilibrium
 
 
@@ -19,6 +19,7 @@ class Frame:
         desired_force: Magnitude of the set-point [N].
         force_scale: Force at which gauge, strip chart and arrows reach full length, positive [N].
         target: Index of the obstacle whose force is shown; ``None`` for the sum over all.
+        start_scene: The obstacles at the start of the episode; of those that have moved since, the way is drawn.
         desired_history: Set-points of the last steps, the present one last, ``(N,)`` [N].
         true_history: Magnitudes of the true force at the same steps, ``(N,)`` [N].
         estimate_history: Magnitudes of the estimated or measured force at the same steps, ``(N,)`` [N].
@@ -33,6 +34,7 @@ class Frame:
     desired_force: float
     force_scale: float
     target: int | None = None
+    start_scene: Scene | None = None
     desired_history: np.ndarray | None = None
     true_history: np.ndarray | None = None
     estimate_history: np.ndarray | None = None
@@ -44,6 +46,12 @@ class Frame:
     def histories(self) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
         """Histories of the true force, the estimated force and the set-point, each ``(N,)`` [N] or ``None``."""
         return self.true_history, self.estimate_history, self.desired_history
+
+    @property
+    def moved(self) -> list[tuple[Obstacle, Obstacle]]:
+        """The obstacles that have moved since the start of the episode: as they were then, and as they rest now."""
+        before, now = self.start_scene or Scene(), self.equilibrium.scene
+        return [(old, new) for old, new in zip(before, now, strict=False) if old.parameters != new.parameters]
 
     @property
     def has_title(self) -> bool:

@@ -104,4 +104,4 @@ def draw_largest(canvas: Canvas, tensions: np.ndarray, full: float, at: tuple[fl
     """Write the tensions of one or two cables, else the largest."""
     texts = [force_unit(full).text(float(tension), full) for tension in tensions]
     largest = texts[int(np.argmax(tensions))]
-    canvas.label(", ".join(texts) if len(texts) <= 2 else f"≤ {largest}", at, PALETTE.cable, 0.5, LAYOUT.small_font)
+    canvas.label(", ".join(texts) if len(texts) <= 2 else f"max {largest}", at, PALETTE.cable, 0.5, LAYOUT.small_font)

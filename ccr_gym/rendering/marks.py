@@ -117,12 +117,20 @@ def draw_spring(canvas: Canvas, anchor: np.ndarray, moved: np.ndarray, aside: fl
     anchor, moved = anchor + shift, moved + shift
     if length > 2:
         parts = (np.arange(2 * COILS) + 0.5) / (2 * COILS)
-        swing = 6.0 * np.where(np.arange(2 * COILS) % 2 == 0, 1.0, -1.0)
+        swing = min(6.0, 0.4 * length) * np.where(np.arange(2 * COILS) % 2 == 0, 1.0, -1.0)
         coil = anchor + parts[:, None] * along + swing[:, None] * side
         canvas.line(np.vstack([anchor, coil, moved]), 1.6, PALETTE.spring)
         canvas.disc(moved, 2.8, PALETTE.spring)
     canvas.disc(anchor, 4.5, PALETTE.spring)
     canvas.disc(anchor, 2.5, PALETTE.panel)
+
+
+def draw_way(canvas: Canvas, before: np.ndarray, now: np.ndarray) -> None:
+    """Draw the way of a moving obstacle on the canvas: a dot where it was, and a thin line to where it is."""
+    canvas.line([before, now], 1.4, PALETTE.muted)
+    canvas.disc(before, 3.0, PALETTE.muted)
+    canvas.disc(now, 3.0, PALETTE.panel)
+    canvas.disc(now, 2.0, PALETTE.muted)
 
 
 def obstacle_notes(obstacle: Obstacle, moved_mm: float) -> list[str]:

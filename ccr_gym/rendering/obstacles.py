@@ -4,7 +4,8 @@ import numpy as np
 
 from ccr_gym.rendering.camera import Camera
 from ccr_gym.rendering.canvas import Canvas
-from ccr_gym.rendering.marks import draw_notes, draw_spring, obstacle_notes
+from ccr_gym.rendering.frame import Frame
+from ccr_gym.rendering.marks import draw_notes, draw_spring, draw_way, obstacle_notes
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE, mix
 from solver import Circle, Equilibrium, HalfPlane, Obstacle
@@ -16,6 +17,15 @@ def draw_obstacles(canvas: Canvas, camera: Camera, equilibrium: Equilibrium) -> 
         draw_obstacle(canvas, camera, obstacle, equilibrium)
         if rest.spring is not None:
             canvas.dashes(camera(_rest_line(rest, equilibrium)), 1.2, PALETTE.spring)
+
+
+def draw_ways(canvas: Canvas, camera: Camera, frame: Frame) -> None:
+    """Draw where moving obstacles were at the start of the episode, dashed, and the way from there."""
+    equilibrium = frame.equilibrium
+    assert isinstance(equilibrium, Equilibrium)
+    for before, now in frame.moved:
+        canvas.dashes(camera(_rest_line(before, equilibrium)), 1.2, PALETTE.muted)
+        draw_way(canvas, *(camera(note_place(obstacle, equilibrium)[0]) for obstacle in (before, now)))
 
 
 def draw_obstacle(canvas: Canvas, camera: Camera, obstacle: Obstacle, equilibrium: Equilibrium) -> None:

@@ -6,7 +6,7 @@ from ccr_gym.rendering.camera import Bounds, Camera, Strokes, extent_points, pla
 from ccr_gym.rendering.canvas import Canvas
 from ccr_gym.rendering.frame import Frame
 from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, smooth_path, taut
-from ccr_gym.rendering.obstacles import draw_all_notes, draw_obstacles, draw_springs
+from ccr_gym.rendering.obstacles import draw_all_notes, draw_obstacles, draw_springs, draw_ways
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE
 from ccr_gym.rendering.units import length_text
@@ -22,6 +22,7 @@ def draw_plane(canvas: Canvas, frame: Frame, world: Region) -> None:
     strokes = Strokes.fit(equilibrium.robot.offset_mm * camera.scale)
     draw_grid(canvas, camera, world)
     draw_obstacles(canvas, camera, equilibrium)
+    draw_ways(canvas, camera, frame)
     draw_base(canvas, camera, equilibrium, strokes, world)
     draw_springs(canvas, camera, equilibrium)
     draw_robot(canvas, camera, equilibrium, strokes)

@@ -10,7 +10,14 @@ from ccr_gym.rendering.frame import Frame
 from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, smooth_path, taut
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE, mix
-from ccr_gym.rendering.surfaces import draw_shadow, draw_solid, draw_springs_and_notes, draw_wall, far_to_near
+from ccr_gym.rendering.surfaces import (
+    draw_shadow,
+    draw_solid,
+    draw_springs_and_notes,
+    draw_wall,
+    draw_ways,
+    far_to_near,
+)
 from ccr_gym.rendering.view import NEAR, View, on_ground
 from solver.common.rod import full_cables
 from solver.spatial import HalfSpace, SpatialEquilibrium
@@ -34,6 +41,7 @@ def draw_space(canvas: Canvas, frame: Frame, world: Region) -> None:
     draw_base(canvas, view)
     hidden = draw_solids(canvas, view, strokes)
     draw_hidden(canvas, view, hidden)
+    draw_ways(canvas, view, frame)
     draw_springs_and_notes(canvas, view, world)
     draw_forces(canvas, view, frame, equilibrium, LAYOUT.arrow_part * view.camera.length_mm, strokes.marker)
     draw_contacts(canvas, view, frame, equilibrium, strokes)

@@ -6,7 +6,8 @@ from itertools import repeat
 import numpy as np
 
 from ccr_gym.rendering.canvas import Canvas
-from ccr_gym.rendering.marks import draw_notes, draw_spring, obstacle_notes
+from ccr_gym.rendering.frame import Frame
+from ccr_gym.rendering.marks import draw_notes, draw_spring, draw_way, obstacle_notes
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE, mix
 from ccr_gym.rendering.view import LIGHT, NEAR, View, on_ground
@@ -69,6 +70,17 @@ def draw_wall(canvas: Canvas, view: View, wall: HalfSpace) -> None:
                 canvas.line(view(middle + across @ np.array([first, second])), 1.0, PALETTE.hatch)
 
 
+def draw_ways(canvas: Canvas, view: View, frame: Frame) -> None:
+    """Draw the way of moving obstacles since the start of the episode."""
+    for pair in frame.moved:
+        draw_way(canvas, *(view(middle_of(view, obstacle)) for obstacle in pair))
+
+
+def middle_of(view: View, obstacle: Obstacle) -> np.ndarray:
+    """Return the centre of an obstacle, of a wall the middle of what is drawn of it, ``(3,)`` [mm]."""
+    return wall_axes(view, obstacle)[0] if isinstance(obstacle, HalfSpace) else np.array(obstacle.extent.center)
+
+
 def wall_axes(view: View, wall: HalfSpace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the point of a wall nearest to what it stops of the robot, and two unit vectors along the wall."""
     nodes = view.equilibrium.nodes
@@ -84,8 +96,7 @@ def draw_springs_and_notes(canvas: Canvas, view: View, world: Region) -> None:
     """Draw the springs of obstacles, and write what is to be known of each obstacle below it, off the robot."""
     equilibrium = view.equilibrium
     for rest, obstacle, moved in zip(equilibrium.scene, equilibrium.scene_now, equilibrium.displacements, strict=True):
-        flat = isinstance(obstacle, HalfSpace)
-        middle = wall_axes(view, obstacle)[0] if isinstance(obstacle, HalfSpace) else np.array(obstacle.extent.center)
+        flat, middle = isinstance(obstacle, HalfSpace), middle_of(view, obstacle)
         x, y = view(middle)
         if rest.spring is not None:
             aside = 0.6 * (0.0 if flat else obstacle.extent.inradius * view.camera.scale)

@@ -337,6 +337,20 @@ def test_spring_and_rest_place_of_a_sprung_obstacle(renderer: Renderer) -> None:
     assert tuple(pictures[0][pixel(soft, (x + 0.9 * radius, y))]) == PALETTE.obstacle
 
 
+@pytest.mark.parametrize("spatial", [False, True])
+def test_way_of_an_obstacle_that_has_moved_since_the_start(renderer: Renderer, spatial: bool) -> None:
+    if spatial:
+        scenes = [Scene([Sphere(center=(60, y, 120), radius=14)]) for y in (-30, 40)]
+        equilibrium = SpatialSolver(SpatialRobot.prototype(), scenes[0]).rest()
+    else:
+        scenes = [Scene([Circle(center=(x, 130), radius=14)]) for x in (60, 100)]
+        equilibrium = Solver(Robot.prototype(), scenes[0]).rest()
+    frame = frame_of(equilibrium, (0.0, 0.0))
+    same, moved = (renderer.draw(replace(frame, start_scene=scene)) for scene in scenes)
+    np.testing.assert_array_equal(same, renderer.draw(frame))
+    assert 50 < (moved != same).any(axis=2).sum() < 3000
+
+
 def test_inserted_length_is_shown_at_the_base(renderer: Renderer) -> None:
     robot = Robot(length_mm=150, segments=18, offset_mm=8, length_range_mm=(140.0, 180.0))
     below = []
@@ -406,7 +420,7 @@ def test_both_arrows_can_be_read_where_they_are_parallel(renderer: Renderer, tou
 
 
 def test_arrow_starts_at_the_target(renderer: Renderer) -> None:
-    obstacles = (Circle(center=(30, 85), radius=13), Circle(center=(60, 138), radius=14))
+    obstacles = (Circle(center=(24, 85), radius=13), Circle(center=(60, 138), radius=14))
     equilibrium = pulled(obstacles, 10.0)
     assert equilibrium.contact.any(axis=(1, 2)).all()
     rows = []
@@ -416,7 +430,7 @@ def test_arrow_starts_at_the_target(renderer: Renderer) -> None:
         rows.append(60 + np.argwhere(mask(world, PALETTE.force_true))[:, 0].mean())
     touched = [equilibrium.points[equilibrium.contact[target]].mean(axis=0) for target in (0, 1)]
     for row, point in zip(rows, touched, strict=True):
-        assert row == pytest.approx(pixel(equilibrium, tuple(point))[0], abs=12)
+        assert row == pytest.approx(pixel(equilibrium, tuple(point))[0], abs=20)
 
 
 @pytest.mark.parametrize(
@@ -546,17 +560,22 @@ def golden_frames() -> dict[str, Frame]:
     }
 
 
-@pytest.mark.parametrize(
-    "name", ["load_cell", "spring_two_cables", "insertion", "snake_arm", "neuroendoscope_in_space"]
-)
+def golden_picture(name: str) -> np.ndarray:
+    return Renderer(fps=30, size=(360, 360)).draw(golden_frames()[name])
+
+
+@pytest.mark.parametrize("name", [path.stem for path in sorted(DATA.glob("*.png"))])
 def test_picture_is_as_recorded(name: str) -> None:
     """Letters and rims may differ with the versions of SDL and FreeType; a part that is missing or moved may not."""
     pygame = import_pygame()
-    picture = Renderer(fps=30, size=(360, 360)).draw(golden_frames()[name]).astype(int)
-    golden = pygame.surfarray.array3d(pygame.image.load(DATA / f"{name}.png")).transpose(1, 0, 2).astype(int)
-    difference = np.abs(picture - golden).max(axis=-1)
+    golden = pygame.surfarray.array3d(pygame.image.load(DATA / f"{name}.png")).transpose(1, 0, 2)
+    difference = np.abs(golden_picture(name).astype(int) - golden).max(axis=-1)
     assert difference.mean() < 1.0
     assert (difference > 48).mean() < 0.005
+
+
+def test_every_picture_is_recorded() -> None:
+    assert {path.stem for path in DATA.glob("*.png")} == set(golden_frames())
 
 
 # ----------------------------------------------------------------------------------------------------------- grid
@@ -664,3 +683,9 @@ def test_missing_pygame_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(DependencyNotInstalled, match=r'pip install "ccr-gym\[render\]"'):
         Renderer(fps=30)
+
+
+if __name__ == "__main__":  # records the pictures anew
+    for recorded in golden_frames():
+        surface = import_pygame().surfarray.make_surface(golden_picture(recorded).transpose(1, 0, 2))
+        import_pygame().image.save(surface, DATA / f"{recorded}.png")
