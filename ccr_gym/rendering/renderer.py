@@ -4,9 +4,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ccr_gym.rendering.banners import draw_footer, draw_legend, draw_title
 from ccr_gym.rendering.canvas import Canvas, import_pygame
+from ccr_gym.rendering.chart import draw_chart
 from ccr_gym.rendering.frame import Frame
-from ccr_gym.rendering.gauge import draw_footer, draw_gauge
+from ccr_gym.rendering.gauge import draw_panel
+from ccr_gym.rendering.page import Page
 from ccr_gym.rendering.planar import draw_plane
 from ccr_gym.rendering.spatial import draw_space
 from solver.spatial import SpatialEquilibrium
@@ -32,6 +35,7 @@ class Renderer:
         self._size = size
         self._window: pygame.Surface | None = None
         self._clock: pygame.time.Clock | None = None
+        self._dismissed = False
 
     def draw(self, frame: Frame) -> np.ndarray:
         """Return the picture of a frame, ``(height, width, 3)`` uint8; needs no display."""
@@ -39,21 +43,30 @@ class Renderer:
         return np.ascontiguousarray(pixels.transpose(1, 0, 2))
 
     def show(self, frame: Frame) -> None:
-        """Show a frame in the window, which the first call opens, and wait until the next frame is due."""
+        """Show a frame in the window, which the first call opens, and wait until the next frame is due.
+
+        Once the user has closed the window, nothing is shown until :meth:`close` is called.
+        """
+        if self._dismissed:
+            return
         if self._window is None or self._pygame.display.get_surface() is not self._window:
             self._open()
         assert self._window is not None
         assert self._clock is not None
-        self._pygame.event.pump()
+        if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
+            self.close()
+            self._dismissed = True
+            return
         self._window.blit(self._picture(frame), (0, 0))
         self._pygame.display.flip()
         self._clock.tick(self._fps)
 
     def close(self) -> None:
-        """Close the window, if it is open."""
+        """Close the window, if it is open; the next frame that is shown opens another."""
         if self._window is not None and self._pygame.display.get_surface() is self._window:
             self._pygame.display.quit()
         self._window = self._clock = None
+        self._dismissed = False
 
     def _open(self) -> None:
         self._pygame.display.init()
@@ -63,8 +76,12 @@ class Renderer:
 
     def _picture(self, frame: Frame) -> "pygame.Surface":
         canvas = Canvas(self._pygame, self._size)
+        page = Page.divide(canvas.region.width, canvas.region.height, frame.has_title, frame.has_chart)
         draw_world = draw_space if isinstance(frame.equilibrium, SpatialEquilibrium) else draw_plane
-        draw_world(canvas, frame)
-        draw_gauge(canvas, frame)
-        draw_footer(canvas, frame.equilibrium)
+        draw_world(canvas, frame, page.world)
+        draw_chart(canvas, frame, page.chart)
+        draw_panel(canvas, frame, page.panel)
+        draw_title(canvas, frame, page.title)
+        draw_legend(canvas, frame, page.legend)
+        draw_footer(canvas, frame, page.footer)
         return canvas.finish()

@@ -1,124 +1,142 @@
-"""The world of a spatial robot, seen at an angle, with shadows on the ground."""
+"""The world of a spatial robot, seen at an angle: what is far is paler, and all cast shadows on the ground."""
 
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from ccr_gym.rendering.camera import Strokes
 from ccr_gym.rendering.canvas import Canvas
 from ccr_gym.rendering.frame import Frame
-from ccr_gym.rendering.marks import draw_arrow, draw_legend, draw_marker, scaled_force
-from ccr_gym.rendering.palette import LAYOUT, PALETTE, Color
-from solver.spatial import SpatialEquilibrium
+from ccr_gym.rendering.marks import disk_widths, draw_contacts, draw_forces, draw_scale_bar, smooth_path, taut
+from ccr_gym.rendering.page import Region
+from ccr_gym.rendering.palette import LAYOUT, PALETTE, mix
+from ccr_gym.rendering.surfaces import (
+    draw_shadow,
+    draw_solid,
+    draw_springs_and_notes,
+    draw_wall,
+    draw_ways,
+    far_to_near,
+)
+from ccr_gym.rendering.view import NEAR, View, on_ground
+from solver.common.rod import full_cables
+from solver.spatial import HalfSpace, SpatialEquilibrium
 
-AZIMUTH, ELEVATION = math.radians(-60), math.radians(22)  # of the viewer
-LEAST_AREA = 1e-9  # of a face that has a normal [mm²]
-RIGHT = np.array([-math.sin(AZIMUTH), math.cos(AZIMUTH), 0.0])
-UP = np.array([-math.sin(ELEVATION) * math.cos(AZIMUTH), -math.sin(ELEVATION) * math.sin(AZIMUTH), math.cos(ELEVATION)])
-NEAR = np.cross(RIGHT, UP)
-RINGS_MM = (20.0, 40.0, 60.0, 80.0)
+RINGS = (0.2, 0.4, 0.6, 0.8)  # over the robot's length
 TURNS = np.linspace(0, 2 * math.pi, 49)
 CIRCLE = np.column_stack([np.cos(TURNS), np.sin(TURNS), np.zeros_like(TURNS)])
-SHADOW: Color = (226, 230, 237)
 
 
-def project(points: ArrayLike) -> np.ndarray:
-    """Return the projections of points ``(…, 3)`` on the picture plane, which the camera maps, ``(…, 2)`` [mm]."""
-    middle = (LAYOUT.left_mm + LAYOUT.right_mm) / 2
-    return np.asarray(np.asarray(points) @ np.column_stack([RIGHT, UP]) + (middle, 0.0))
-
-
-def draw_space(canvas: Canvas, frame: Frame) -> None:
-    """Draw the spatial world, left of the gauge and above the footer."""
+def draw_space(canvas: Canvas, frame: Frame, world: Region) -> None:
+    """Draw the spatial world."""
     equilibrium = frame.equilibrium
     assert isinstance(equilibrium, SpatialEquilibrium)
-    draw_ground(canvas)
-    surfaces = [obstacle.outline() for obstacle in equilibrium.scene_now]
-    for surface in surfaces:
-        fill(canvas, shadow(surface), SHADOW)
-    line(canvas, shadow(equilibrium.nodes), 3.0, SHADOW)
-    middles = (equilibrium.nodes[:-1] + equilibrium.nodes[1:]) / 2 @ NEAR
-    nearest = max((float(surface.reshape(-1, 3).mean(axis=0) @ NEAR) for surface in surfaces), default=-math.inf)
-    draw_robot(canvas, equilibrium, middles < nearest)
-    for surface in sorted(surfaces, key=lambda surface: float(surface.reshape(-1, 3).mean(axis=0) @ NEAR)):
-        draw_surface(canvas, surface)
-    draw_robot(canvas, equilibrium, middles >= nearest)
-    draw_forces(canvas, frame, equilibrium)
-    for point in equilibrium.points[equilibrium.contact.any(axis=0)]:
-        draw_marker(canvas, canvas.camera(project(point)))
-    draw_legend(canvas)
+    view = View.fit(equilibrium, world)
+    strokes = Strokes.fit(equilibrium.robot.offset_mm * view.camera.scale)
+    draw_ground(canvas, view, world)
+    for obstacle in equilibrium.scene_now:
+        if isinstance(obstacle, HalfSpace):
+            draw_wall(canvas, view, obstacle)
+    draw_shadows(canvas, view)
+    draw_base(canvas, view)
+    hidden = draw_solids(canvas, view, strokes)
+    draw_hidden(canvas, view, hidden)
+    draw_ways(canvas, view, frame)
+    draw_springs_and_notes(canvas, view, world)
+    draw_forces(canvas, view, frame, equilibrium, LAYOUT.arrow_part * view.camera.length_mm, strokes.marker)
+    draw_contacts(canvas, view, frame, equilibrium, strokes)
+    draw_scale_bar(canvas, view.camera, world)
 
 
-def draw_ground(canvas: Canvas) -> None:
-    """Draw rings around the base, and the x and y axes."""
-    for radius in RINGS_MM:
-        line(canvas, radius * CIRCLE, 1.0, PALETTE.grid)
+def draw_ground(canvas: Canvas, view: View, world: Region) -> None:
+    """Draw the ground as a disc, rings around the base, and the x and y axes."""
+    length = view.camera.length_mm
+    canvas.polygon(view(RINGS[-1] * length * CIRCLE), PALETTE.ground)
+    for radius in RINGS:
+        canvas.line(view(radius * length * CIRCLE), 1.0, PALETTE.border)
     for side, name in zip(np.eye(3)[:2], "xy", strict=True):
-        line(canvas, [-RINGS_MM[-1] * side, RINGS_MM[-1] * side], 1.0, PALETTE.border)
-        x, y = canvas.camera(project((RINGS_MM[-1] + 8) * side))
-        canvas.label(name, (float(x), float(y)), PALETTE.muted, 0.5)
+        canvas.line(view(RINGS[-1] * length * np.array([-side, side])), 1.0, PALETTE.border)
+        at = view(1.06 * RINGS[-1] * length * side)
+        canvas.label(name, at, PALETTE.muted, 0.5, within=world)
 
 
-def draw_surface(canvas: Canvas, surface: np.ndarray) -> None:
-    """Draw the visible faces of a grid ``(u, v, 3)``, lighter the more they face the viewer."""
-    corners = faces(surface)
-    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    sizes = np.linalg.norm(normals, axis=1)
-    facing = np.where(sizes > LEAST_AREA, normals @ NEAR / np.maximum(sizes, LEAST_AREA), 0.0)
-    dark, light = np.array(PALETTE.outline), np.array(PALETTE.obstacle)
-    outward = np.sum((corners.mean(axis=1) - corners.mean(axis=(0, 1))) * normals)
-    shades = np.abs(facing) if len(corners) == 1 else np.copysign(facing, facing * outward)
-    for face, shade in zip(canvas.camera(project(corners)), shades, strict=True):
-        if shade > 0:
-            color = dark + (0.35 + 0.65 * shade) * (light - dark)
-            red, green, blue = color.astype(int).tolist()
-            canvas.polygon(face, (red, green, blue))
+def draw_shadows(canvas: Canvas, view: View) -> None:
+    """Draw the shadows of obstacles and robot, and plumb lines from the tip and the obstacles to the ground."""
+    equilibrium = view.equilibrium
+    solids = [obstacle for obstacle in equilibrium.scene_now if math.isfinite(obstacle.extent.radius)]
+    for obstacle in solids:
+        draw_shadow(canvas, view, obstacle)
+    canvas.line(view(on_ground(equilibrium.nodes)), 4.0, mix(PALETTE.shadow, PALETTE.outline, 0.45))
+    for point in (equilibrium.nodes[-1], *(np.array(obstacle.extent.center) for obstacle in solids)):
+        foot = on_ground(point)
+        canvas.dashes(view([point, foot]), 1.0, PALETTE.muted, 3.0)
+        canvas.disc(view(foot), 2.0, PALETTE.muted)
 
 
-def draw_robot(canvas: Canvas, equilibrium: SpatialEquilibrium, visible: np.ndarray) -> None:
-    """Draw disks, pulled cables and backbone of some segments, from far to near."""
-    nodes, frames, pulled = equilibrium.nodes, equilibrium.frames, equilibrium.pulled
-    order = np.flatnonzero(visible)
-    for i in order[np.argsort(nodes[order] @ NEAR)]:
-        rim = nodes[i + 1] + equilibrium.robot.offset_mm * CIRCLE @ frames[i + 1].T
-        line(canvas, rim, LAYOUT.disk if i % 2 == 0 else 0.6 * LAYOUT.major_disk, PALETTE.disk)
-        for cable in pulled:
-            line(canvas, cable[i : i + 2], LAYOUT.cable, PALETTE.cable)
-        line(canvas, nodes[i : i + 2], LAYOUT.backbone, PALETTE.backbone)
+def draw_base(canvas: Canvas, view: View) -> None:
+    """Draw the clamp, a low round block on the ground."""
+    robot = view.equilibrium.robot
+    radius = max(1.6 * robot.offset_mm, 0.05 * robot.longest_mm)
+    low, high = (radius * CIRCLE + (0.0, 0.0, height * radius) for height in (-0.5, 0.0))
+    rims = view(low), view(high)
+    canvas.polygon(rims[0], PALETTE.clamp)
+    left, right = (rims[0][:, 0].argmin(), rims[0][:, 0].argmax())
+    canvas.polygon([rims[0][left], rims[0][right], rims[1][right], rims[1][left]], PALETTE.clamp)
+    canvas.polygon(rims[1], mix(PALETTE.clamp, PALETTE.panel, 0.35))
 
 
-def draw_forces(canvas: Canvas, frame: Frame, equilibrium: SpatialEquilibrium) -> None:
-    """Draw arrows of the true and estimated force on the obstacles, from the mean contact point."""
-    if not equilibrium.contact.any():
-        return
-    weights = np.where(equilibrium.contact, equilibrium.multipliers, 0.0).sum(axis=0)
-    start = np.average(equilibrium.points.reshape(-1, 3), axis=0, weights=weights.ravel())
-    for force, width, color in (
-        (frame.force_true, LAYOUT.arrow, PALETTE.force_true),
-        (frame.force_est, LAYOUT.arrow_slim, PALETTE.force_est),
-    ):
-        end = start - LAYOUT.arrow_mm * scaled_force(force, frame.force_scale)
-        first, last = canvas.camera(project([start, end]))
-        draw_arrow(canvas, first, last - first, width, color)
+def draw_solids(canvas: Canvas, view: View, strokes: Strokes) -> np.ndarray:
+    """Draw obstacles and robot, what is hidden before what hides it; return which segments are hidden, ``(n,)``."""
+    nodes, obstacles = view.equilibrium.nodes, list(view.equilibrium.scene_now)
+    order = far_to_near(view)
+    hidden = view.hidden_by(0.5 * (nodes[:-1] + nodes[1:]))
+    left = np.ones(len(nodes) - 1, dtype=bool)
+    for index in order:
+        draw_robot(canvas, view, strokes, left & hidden[index])
+        draw_solid(canvas, view, obstacles[index])
+        left &= ~hidden[index]
+    draw_robot(canvas, view, strokes, left)
+    return ~left
 
 
-def shadow(points: np.ndarray) -> np.ndarray:
-    """Project points onto the ground."""
-    return points * (1.0, 1.0, 0.0)
+def draw_robot(canvas: Canvas, view: View, strokes: Strokes, chosen: np.ndarray) -> None:
+    """Draw disks, cables, each to the disk where it ends, and backbone of some segments, from far to near."""
+    equilibrium = view.equilibrium
+    robot, nodes = equilibrium.robot, equilibrium.nodes
+    cables = _cables(equilibrium)
+    scale = view.camera.scale
+    widths = disk_widths(len(nodes), 0.0, robot.segment_mm * scale, strokes, least=9.0)
+    order = np.flatnonzero(chosen)
+    for i in order[np.argsort((nodes[order] + nodes[order + 1]) @ NEAR, kind="stable")]:
+        middle = 0.5 * (nodes[i] + nodes[i + 1])
+        size = 0.75 + 0.5 * float(view.nearness(middle))
+        for path, tight in cables:
+            if i + 1 < len(path):
+                color = view.faded(PALETTE.cable if tight else PALETTE.slack, path[i])
+                canvas.line(view(path[i : i + 2]), size * strokes.cable, color)
+        path = nodes[i : i + 2]
+        if robot.model == "rod":
+            path = smooth_path(path, equilibrium.frames[i : i + 2, :, 2], robot.segment_mm)
+        canvas.line(view(path), size * strokes.backbone, view.faded(PALETTE.backbone, middle))
+        if widths[i + 1]:
+            rim = nodes[i + 1] + robot.offset_mm * CIRCLE @ equilibrium.frames[i + 1].T
+            canvas.line(view(rim), 0.8 * size * widths[i + 1], view.faded(PALETTE.disk, nodes[i + 1]))
 
 
-def line(canvas: Canvas, points: ArrayLike, width: float, color: Color) -> None:
-    """Draw a polyline through points in space."""
-    canvas.line(canvas.camera(project(points)), width, color)
+def _cables(equilibrium: SpatialEquilibrium) -> list[tuple[np.ndarray, bool]]:
+    """Return the points of all cables up to where they end, and which are taut; slack ones first."""
+    robot, pulled, tight = equilibrium.robot, equilibrium.pulled, taut(equilibrium)
+    if robot.model == "paper":
+        opposite = [(2 * equilibrium.nodes - path, False) for path in pulled]
+        return opposite + list(zip(pulled, tight.tolist(), strict=True))
+    ends = [cable.end or robot.segments for cable in full_cables(robot)]
+    paths = [path[: end + 1] for path, end in zip(pulled, ends, strict=True)]
+    return sorted(zip(paths, tight.tolist(), strict=True), key=lambda cable: cable[1])
 
 
-def fill(canvas: Canvas, surface: np.ndarray, color: Color) -> None:
-    """Fill all faces of a grid ``(u, v, 3)``."""
-    for face in canvas.camera(project(faces(surface))):
-        canvas.polygon(face, color)
-
-
-def faces(surface: np.ndarray) -> np.ndarray:
-    """Return the corners of the faces of a grid ``(u, v, 3)``, ``(k, 4, 3)``."""
-    corners = [surface[:-1, :-1], surface[1:, :-1], surface[1:, 1:], surface[:-1, 1:]]
-    return np.stack(corners, axis=2).reshape(-1, 4, 3)
+def draw_hidden(canvas: Canvas, view: View, hidden: np.ndarray) -> None:
+    """Draw where the backbone runs behind obstacles, as a thin dashed line."""
+    nodes = view.equilibrium.nodes
+    color = mix(PALETTE.backbone, PALETTE.obstacle, 0.45)
+    for i in np.flatnonzero(hidden):
+        canvas.dashes(view(nodes[i : i + 2]), 1.4, color, 3.0)
