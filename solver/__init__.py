@@ -6,6 +6,7 @@ from solver.common.equilibrium import Optimality, Residuals
 from solver.common.obstacle import Extent, Obstacle
 from solver.common.presets import PRESETS, Preset
 from solver.common.rod import Cable, Load
+from solver.common.rows import Rows
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.common.trace import Trace
@@ -56,6 +57,7 @@ __all__ = [
     "Residuals",
     "RigidityFit",
     "Robot",
+    "Rows",
     "Scene",
     "Sensitivity",
     "Solver",

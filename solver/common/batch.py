@@ -1,18 +1,18 @@
 """Base class of batches: many equal robots, each in its own scene, moved by one call of the kernel."""
 
 import os
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from solver.common.checks import check_clear, check_core, check_memory, check_scene
+from solver.common.checks import check_clear, check_scene
 from solver.common.equilibrium import BaseEquilibrium, RobotT_co
-from solver.common.exclusive import ExclusiveUse
 from solver.common.geometry import touching_gaps
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
+from solver.common.rows import RowBatch
 from solver.common.scene import MAX_OBSTACLES, Scene
 from solver.common.status import Status
 from solver.common.validation import (
@@ -20,18 +20,16 @@ from solver.common.validation import (
     check_array,
     check_instance,
     check_positive,
-    check_sequence,
     check_whole,
     shown,
 )
 
 EquilibriumT_co = TypeVar("EquilibriumT_co", bound=BaseEquilibrium[AnyRobot], covariant=True)
-Kernel = Any  # a batch or a scene of the kernel, whose classes for the plane and for space share no base
 
 MAX_PULL_STEPS = 100_000  # of a trial pull
 
 
-class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
+class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
     """Moves many robots at once, each with results bit-identical to those of its solver.
 
     Unlike a solver, a batch keeps the present equilibria, as rows of arrays that are written in place.
@@ -40,6 +38,9 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
     like any signal whose handler raises, ends a call within a fraction of a second, also amid a step. Robots whose
     steps had ended keep their new blocks, statuses and counts, the others stay where they were, and :attr:`commands`
     holds the new commands of all. After an interrupted :meth:`rest`, its robots do not move until it is repeated.
+
+    A batch that is copied or pickled goes on with the same bits, in another process too. To copy single robots, use
+    :meth:`get_rows` and :meth:`set_rows`.
 
     Attributes:
         blocks: Equilibria, ``(N, size)``, in the memory layout of :attr:`layout`.
@@ -59,46 +60,23 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         TypeError: If the robot is not one of the batch's space.
     """
 
-    space: ClassVar[int]
-    robot_kind: ClassVar[type]
-
     def __init__(self, robot: RobotT_co, count: int, obstacles: int, threads: int = 1) -> None:
         check_scene(robot, self.robot_kind, Scene(), self.space)
-        self.robot, self.count = robot, check_whole("count", count, 1, 2**31 - 1)
+        count = check_whole("count", count, 1, 2**31 - 1)
         obstacles = check_whole("obstacles", obstacles, 0, MAX_OBSTACLES)
         threads = check_whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "more do not help")
-        self.layout = self._make_layout(obstacles)
-        check_memory(self.count, self.layout.size)
-        self.blocks = np.zeros((self.count, self.layout.size))
-        self.statuses = np.zeros(self.count, np.int64)
-        self.iterations = np.zeros(self.count, np.int64)
-        self.factorizations = np.zeros(self.count, np.int64)
+        RowBatch.__init__(self, robot, count, self._make_layout(robot, obstacles), threads)
         self._work = self.statuses, self.iterations, self.factorizations
-        self._scenes: list[Scene | None] = [None] * self.count
-        self.cables = len(robot.cables)
-        self.commands = np.zeros((self.count, self.cables + 1))
-        self._kernel_batch = self._make_kernel(obstacles, threads)
-        self._all = list(range(self.count))
-        self._exclusive = ExclusiveUse()
         self._clear: Scene | None = None  # last scene found to leave the straight robot clear
         self._straight: np.ndarray | None = None  # points of the straight robot, computed on first use
-        self._unrested = set(self._all)  # must be brought to rest before they move
         least, most = robot.least_cable_mm, robot.cable_limit_mm
         self._low = np.array(self.cables * [least] + [robot.shortest_mm])
         self._high = np.array(self.cables * [most] + [robot.longest_mm])
         self._bound = f"from {least:.6g} to {most:.6g} (robot.max_cable_mm)"
 
     @abstractmethod
-    def _make_layout(self, obstacles: int) -> Layout:
-        """Return the memory layout of a block."""
-
-    @abstractmethod
-    def _make_kernel(self, obstacles: int, threads: int) -> Kernel:
-        """Return the kernel's batch."""
-
-    @abstractmethod
-    def _kernel_obstacles(self, scene: Scene) -> Kernel:
-        """Return the obstacles of a scene as the kernel takes them."""
+    def _make_layout(self, robot: Any, obstacles: int) -> Layout:
+        """Return the memory layout of a block of a robot."""
 
     @abstractmethod
     def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> EquilibriumT_co:
@@ -122,13 +100,9 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
         if scene == self._scenes[index]:
             return
-        check_scene(self.robot, self.robot_kind, scene, self.space)
-        if len(scene) != self.layout.obstacles:
-            raise ValueError(f"scene has {len(scene)} obstacles; each of the batch's has {self.layout.obstacles}")
-        check_core(self.robot, scene)
+        compiled = self._compile(scene)
         if scene is not self._clear:
             check_clear(self.robot, scene, self._straight_gaps(scene))
-        compiled = self._kernel_obstacles(scene)
         with self._exclusive:
             self._kernel_batch.set_obstacles(index, compiled)
             self._scenes[index] = scene
@@ -272,17 +246,6 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
             )
         return np.array(found, bool), reached
 
-    def scene(self, index: int) -> Scene:
-        """Return the scene of a robot.
-
-        Raises:
-            ValueError: If none was assigned.
-        """
-        scene = self._scenes[self._check_index(index)]
-        if scene is None:
-            raise ValueError(f"robot {index} has no scene; call assign({index}, scene)")
-        return scene
-
     def equilibrium(self, index: int) -> EquilibriumT_co:
         """Return the present equilibrium of a robot.
 
@@ -297,33 +260,6 @@ class RobotBatch(ABC, Generic[RobotT_co, EquilibriumT_co]):
         self._check_rested([index])
         work = int(self.iterations[index]), int(self.factorizations[index])
         return self._make_equilibrium(scene, self.blocks[index].copy(), Status(self.statuses[index]), *work)
-
-    def _check_index(self, index: object) -> int:
-        if type(index) is int and 0 <= index < self.count:
-            return index
-        return check_whole("robot index", index, 0, self.count - 1, f"the batch has {self.count} robots")
-
-    def _check_indices(self, robots: Sequence[int]) -> list[int]:
-        """Return indices of robots, each named once."""
-        indices = list(map(self._check_index, check_sequence("robots", robots, "a list of indices")))
-        if len(set(indices)) != len(indices):
-            raise ValueError(f"robots is {shown(robots)}; it must name each robot once")
-        return indices
-
-    def _check_assigned(self, robots: Sequence[int]) -> list[int]:
-        """Return indices of robots that have scenes, each named once."""
-        indices = self._check_indices(robots)
-        for robot in indices:
-            self.scene(robot)
-        return indices
-
-    def _check_rested(self, robots: list[int]) -> None:
-        """Check that robots were brought to rest in their scenes."""
-        for robot in self._unrested.intersection(robots):
-            self.scene(robot)
-            raise ValueError(
-                f"robot {robot} has a new scene, or its rest was interrupted; call rest([{robot}]) before it moves"
-            )
 
     def _check_lengths(self, robots: list[int]) -> None:
         """Check the lengths in blocks, which users may have written to."""

@@ -30,8 +30,8 @@ class BatchSolver(RobotBatch[Robot, Equilibrium]):
         nodes[:, 1] = np.linspace(0.0, self.robot.length_mm, len(nodes))
         return touching_points(self.robot, nodes)
 
-    def _make_layout(self, obstacles: int) -> Layout:
-        return layout(self.robot, obstacles)
+    def _make_layout(self, robot: Robot, obstacles: int) -> Layout:
+        return layout(robot, obstacles)
 
     def _make_kernel(self, obstacles: int, threads: int) -> _kernel.Batch:
         return _kernel.Batch(kernel_robot(self.robot), self.count, obstacles, threads)

@@ -6,6 +6,7 @@ import numpy as np
 
 from solver import _kernel
 from solver.common.checks import check_core, check_origin, check_rest, check_scene
+from solver.common.copying import RebuiltFromScene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles, kernel_rod
 from solver.common.layout import PLANE
@@ -16,7 +17,7 @@ from solver.planar.equilibrium import Equilibrium
 from solver.planar.robot import Robot
 
 
-class CommandCheck:
+class CommandCheck(RebuiltFromScene):
     """Checks the commands of a solver in the plane, whatever it solves by."""
 
     robot: Robot

@@ -26,8 +26,8 @@ class SpatialBatchSolver(RobotBatch[SpatialRobot, SpatialEquilibrium]):
         nodes[:, 2] = np.linspace(0.0, self.robot.length_mm, len(nodes))
         return touching_points(self.robot, nodes, np.tile(np.eye(3), (len(nodes), 1, 1)))
 
-    def _make_layout(self, obstacles: int) -> Layout:
-        return spatial_layout(self.robot, obstacles)
+    def _make_layout(self, robot: SpatialRobot, obstacles: int) -> Layout:
+        return spatial_layout(robot, obstacles)
 
     def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialBatch:
         return _kernel.SpatialBatch(kernel_robot(self.robot), self.count, obstacles, threads)

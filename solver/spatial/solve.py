@@ -6,6 +6,7 @@ import numpy as np
 
 from solver import _kernel
 from solver.common.checks import check_core, check_origin, check_rest, check_scene
+from solver.common.copying import RebuiltFromScene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles, kernel_rod
 from solver.common.layout import SPACE
@@ -16,7 +17,7 @@ from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import SpatialRobot, stiffness_ratios
 
 
-class SpatialCommandCheck:
+class SpatialCommandCheck(RebuiltFromScene):
     """Checks the commands of a solver in space, whatever it solves by."""
 
     robot: SpatialRobot

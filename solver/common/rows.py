@@ -1,0 +1,194 @@
+"""Rows of a batch: the robots it moves, each with its scene and equilibrium, taken out and put back."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, Self
+
+import numpy as np
+
+from solver.common.checks import check_core, check_memory, check_scene
+from solver.common.equilibrium import RobotT_co
+from solver.common.exclusive import ExclusiveUse
+from solver.common.layout import Layout
+from solver.common.robot import AnyRobot
+from solver.common.scene import Scene
+from solver.common.validation import check_instance, check_sequence, check_whole, shown
+
+Kernel = Any  # a batch or a scene of the kernel, whose classes for the plane and for space share no base
+NUMBERS = ("blocks", "statuses", "iterations", "factorizations", "commands")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """States of robots of a batch: all that their next step depends on.
+
+    Attributes:
+        robot: The robot that all of them are.
+        scenes: Scene of each, ``None`` where none was assigned, k of them.
+        rested: Whether each was brought to rest in its scene and may move, ``(k,)`` bool.
+        blocks: Their equilibria, ``(k, size)``.
+        statuses: How their last steps ended, ``(k,)``.
+        iterations: Newton iterations of these steps, ``(k,)``.
+        factorizations: Factorisations of the Hessian in these steps, ``(k,)``.
+        commands: Cable displacements and length that they are moved to, ``(k, cables + 1)`` [mm].
+    """
+
+    robot: AnyRobot
+    scenes: tuple[Scene | None, ...]
+    rested: np.ndarray
+    blocks: np.ndarray
+    statuses: np.ndarray
+    iterations: np.ndarray
+    factorizations: np.ndarray
+    commands: np.ndarray
+
+
+class RowBatch(ABC, Generic[RobotT_co]):
+    """Base class of a batch: its rows, which are copied, pickled and restored with it."""
+
+    space: ClassVar[int]
+    robot_kind: ClassVar[type]
+
+    def __init__(self, robot: RobotT_co, count: int, layout: Layout, threads: int) -> None:
+        self.robot, self.count, self.layout, self.threads = robot, count, layout, threads
+        self.cables = len(robot.cables)
+        check_memory(count, layout.size)
+        self.blocks = np.zeros((count, layout.size))
+        self.statuses = np.zeros(count, np.int64)
+        self.iterations = np.zeros(count, np.int64)
+        self.factorizations = np.zeros(count, np.int64)
+        self.commands = np.zeros((count, self.cables + 1))
+        self._scenes: list[Scene | None] = [None] * count
+        self._all = list(range(count))
+        self._unrested = set(self._all)  # must be brought to rest before they move
+        self._exclusive = ExclusiveUse()
+        self._kernel_batch = self._make_kernel(layout.obstacles, threads)
+
+    @abstractmethod
+    def _make_kernel(self, obstacles: int, threads: int) -> Kernel:
+        """Return the kernel's batch."""
+
+    @abstractmethod
+    def _kernel_obstacles(self, scene: Scene) -> Kernel:
+        """Return the obstacles of a scene as the kernel takes them."""
+
+    def get_rows(self, robots: Sequence[int]) -> Rows:
+        """Return the states of some robots, as copies, which :meth:`set_rows` puts back, here or in another batch.
+
+        Args:
+            robots: Indices of the robots; one that is repeated has several rows.
+
+        Raises:
+            ValueError: If an index is out of range.
+        """
+        indices = list(map(self._check_index, check_sequence("robots", robots, "a list of indices")))
+        with self._exclusive:
+            numbers = [getattr(self, name)[indices] for name in NUMBERS]
+            rested = np.array([index not in self._unrested for index in indices], bool)
+            return Rows(self.robot, tuple(self._scenes[index] for index in indices), rested, *numbers)
+
+    def set_rows(self, robots: Sequence[int], rows: Rows) -> None:
+        """Put robots into states of :meth:`get_rows`, from which they go on as those robots would, bit for bit.
+
+        ``forks.set_rows(range(8), batch.get_rows([3] * 8))`` makes eight robots of one.
+
+        Args:
+            robots: Indices of the robots, one for each row.
+            rows: Their new states.
+
+        Raises:
+            ValueError: If an index is out of range or repeated, or the rows are of another robot, of another number of
+                robots or obstacles, or hold numbers that no state has; nothing has changed then.
+            TypeError: If ``rows`` is not what :meth:`get_rows` returns.
+        """
+        indices = self._check_indices(robots)
+        self._check_rows(rows, len(indices))
+        pairs = zip(indices, rows.scenes, strict=True)
+        changed = [(index, scene) for index, scene in pairs if scene is not None and scene != self._scenes[index]]
+        compiled = {scene: self._compile(scene) for scene in {scene for _, scene in changed}}
+        with self._exclusive:
+            for index, scene in changed:
+                self._kernel_batch.set_obstacles(index, compiled[scene])
+            for index, scene, rested in zip(indices, rows.scenes, rows.rested.tolist(), strict=True):
+                self._scenes[index] = scene
+                (self._unrested.discard if rested and scene is not None else self._unrested.add)(index)
+            for name in NUMBERS:
+                getattr(self, name)[indices] = getattr(rows, name)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...], Rows]:
+        arguments = self.robot, self.count, self.layout.obstacles, self.threads
+        return type(self), arguments, self.get_rows(self._all)
+
+    def __setstate__(self, rows: Rows) -> None:
+        self.set_rows(self._all, rows)
+
+    def _check_rows(self, rows: Rows, count: int) -> None:
+        """Check that rows are states of robots of this batch.
+
+        Raises:
+            ValueError: Naming what differs.
+            TypeError: If they are no rows.
+        """
+        check_instance("rows", rows, Rows, "take those of get_rows")
+        if rows.robot != self.robot:
+            raise ValueError("the rows are of another robot; take those of a batch of an equal robot")
+        if len(rows.scenes) != count or np.shape(rows.rested) != (count,):
+            raise ValueError(f"rows has {len(rows.scenes)} scenes; it must have one for each of the {count} robots")
+        for name in NUMBERS:
+            numbers, present = np.asarray(getattr(rows, name)), getattr(self, name)
+            if numbers.shape != (count, *present.shape[1:]) or numbers.dtype != present.dtype:
+                raise ValueError(
+                    f"{name} of rows has the shape {numbers.shape} of {numbers.dtype}; it must be "
+                    f"{(count, *present.shape[1:])} of {present.dtype}: take the rows of get_rows"
+                )
+
+    def _compile(self, scene: Scene) -> Kernel:
+        """Return the obstacles of a scene as the kernel takes them.
+
+        Raises:
+            ValueError: If the scene is none for the robot, or does not have the batch's number of obstacles.
+        """
+        check_scene(self.robot, self.robot_kind, scene, self.space)
+        if len(scene) != self.layout.obstacles:
+            raise ValueError(f"scene has {len(scene)} obstacles; each of the batch's has {self.layout.obstacles}")
+        check_core(self.robot, scene)
+        return self._kernel_obstacles(scene)
+
+    def scene(self, index: int) -> Scene:
+        """Return the scene of a robot.
+
+        Raises:
+            ValueError: If none was assigned.
+        """
+        scene = self._scenes[self._check_index(index)]
+        if scene is None:
+            raise ValueError(f"robot {index} has no scene; call assign({index}, scene)")
+        return scene
+
+    def _check_index(self, index: object) -> int:
+        if type(index) is int and 0 <= index < self.count:
+            return index
+        return check_whole("robot index", index, 0, self.count - 1, f"the batch has {self.count} robots")
+
+    def _check_indices(self, robots: Sequence[int]) -> list[int]:
+        """Return indices of robots, each named once."""
+        indices = list(map(self._check_index, check_sequence("robots", robots, "a list of indices")))
+        if len(set(indices)) != len(indices):
+            raise ValueError(f"robots is {shown(robots)}; it must name each robot once")
+        return indices
+
+    def _check_assigned(self, robots: Sequence[int]) -> list[int]:
+        """Return indices of robots that have scenes, each named once."""
+        indices = self._check_indices(robots)
+        for robot in indices:
+            self.scene(robot)
+        return indices
+
+    def _check_rested(self, robots: list[int]) -> None:
+        """Check that robots were brought to rest in their scenes."""
+        for robot in self._unrested.intersection(robots):
+            self.scene(robot)
+            raise ValueError(
+                f"robot {robot} has a new scene, or its rest was interrupted; call rest([{robot}]) before it moves"
+            )
