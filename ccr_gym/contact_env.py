@@ -17,6 +17,7 @@ from ccr_gym.rendering import Frame, Renderer
 from ccr_gym.reward import TERMS
 from ccr_gym.scales import FORCE_SPAN, Scales
 from ccr_gym.settings import AnySettings
+from ccr_gym.state import EnvState, check_state, restored
 from ccr_gym.task import AnyTask, Assignment, check_force, check_task
 from solver import Equilibrium, Scene
 from solver.spatial import SpatialEquilibrium
@@ -119,6 +120,33 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             return self._renderer.draw(frame)
         self._renderer.show(frame)
         return None
+
+    def get_state(self) -> EnvState:
+        """Return the state of the episode and of the generator, with which :meth:`set_state` goes on.
+
+        It holds nothing of the environment's arguments, and of no wrapper around it.
+        """
+        episodes = self._episodes.get_rows([0]) if self._started else None
+        generator = None if self._np_random is None else self._np_random.bit_generator.state
+        return EnvState(episodes, (generator,), np.zeros(1, int), np.zeros(1, bool))
+
+    def set_state(self, state: EnvState) -> None:
+        """Put the environment into a state of :meth:`get_state` of one with the same arguments.
+
+        From there it goes on with the same bits, in another process too.
+
+        Raises:
+            TypeError: If it is no such state.
+            ValueError: If it is that of a vector environment, or of another robot.
+        """
+        check_state(state, 1)
+        if state.episodes is not None:
+            self._episodes.set_rows([0], state.episodes)
+        self._started = state.episodes is not None
+        self._np_random = restored(self._np_random, state.generators[0])
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "_renderer": None}  # a window or canvas is made anew
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -21,6 +21,7 @@ from ccr_gym.sampling import Trials, check_robot
 from ccr_gym.scales import AHEAD
 from ccr_gym.sensing import Imperfections, SensorModel, sample_imperfections
 from ccr_gym.settings import AnySettings
+from ccr_gym.state import EpisodeState, put, take
 from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment
 from solver import Equilibrium
 from solver.common.batch import BaseBatch
@@ -28,6 +29,7 @@ from solver.spatial import SpatialEquilibrium
 
 ALL = slice(None)
 SEEDS = 2**32
+STATE = ("_desired_n", "_goal_n", "_profiles", "_actuated_mm", "_last_actions", "_obstacle_features", "_time")
 
 
 class Pipeline(NamedTuple):
@@ -313,6 +315,26 @@ class EpisodeBatch:
             factors = self._estimator.probe(self._measured(blocks, actuated_mm, ALL))
             return np.asarray(factors[:, None] * forces)
         return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
+
+    def get_rows(self, robots: list[int]) -> EpisodeState:
+        """Return the states of the episodes of some robots."""
+        learnt, free = self._estimator.get_rows(robots)
+        sensors = {} if self._sensors is None else self._sensors.get_rows(robots)
+        return EpisodeState(self.batch.get_rows(robots), free, take(self, STATE, robots), learnt, sensors)
+
+    def set_rows(self, robots: list[int], state: EpisodeState) -> None:
+        """Put robots into states of :meth:`get_rows`, from which they go on with the same bits.
+
+        Raises:
+            ValueError: If they are states of other robots.
+        """
+        scenes = {len(scene) for scene in state.rows.scenes if scene is not None}
+        self._use(self._pipeline_for(scenes.pop() if scenes else self._task.obstacles))
+        self.batch.set_rows(robots, state.rows)
+        self._estimator.set_rows(robots, state.estimator, state.free)
+        put(self, state.episode, robots)
+        if self._sensors is not None:
+            self._sensors.set_rows(robots, state.sensors)
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:
         """Return a robot's present equilibrium; it is immutable."""

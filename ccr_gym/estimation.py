@@ -15,8 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ccr_gym.adapters import AnyAdapter
+from ccr_gym.state import Arrays, put, take
 from solver import RigidityFit, Robot, Scene, fitted_slopes, virtual_work
 from solver.common.operations import ARRAYS
+from solver.common.rows import Rows
 from solver.spatial import sides, with_friction
 from solver.spatial import virtual_work as spatial_virtual_work
 
@@ -24,6 +26,7 @@ DIFFERENCE = 1e-4  # of a command, for slopes [a]
 LEAST_SLOPE = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
 TENSION_NOISE = 0.006  # standard deviation of the tensions that the rigidity is learnt from [EI/(aL)]
 FITTED = 1.0  # largest displacement of the straight lines of Fig. 7 [a]
+STATE = ("chosen", "paper", "_products", "_squares")  # arrays of a ForceEstimator
 TINY = 1e-300  # keeps quotients defined where nothing touches
 
 
@@ -79,6 +82,14 @@ class FreeRobots:
     def rest(self, robots: Sequence[int] | np.ndarray) -> None:
         """Bring some robots to rest."""
         self._batch.rest(self._rows[robots].ravel().tolist())
+
+    def get_rows(self, robots: list[int]) -> Rows:
+        """Return the states of some robots and their companions."""
+        return self._batch.get_rows(self._rows[robots].ravel().tolist())
+
+    def set_rows(self, robots: list[int], rows: Rows) -> None:
+        """Put robots and their companions into states of :meth:`get_rows`."""
+        self._batch.set_rows(self._rows[robots].ravel().tolist(), rows)
 
     def move(self, robots: np.ndarray, actuated_mm: np.ndarray) -> FreeMotion:
         """Move some robots to actuated coordinates ``(k, actions)`` [mm], and return their motion there."""
@@ -145,6 +156,16 @@ class ForceEstimator:
         self._products[robots], self._squares[robots] = prior.products, prior.squares
         if self._free is not None:
             self._free.rest(robots)
+
+    def get_rows(self, robots: list[int]) -> tuple[Arrays, Rows | None]:
+        """Return what was learnt of some robots, and the robots that nothing touches."""
+        return take(self, STATE, robots), None if self._free is None else self._free.get_rows(robots)
+
+    def set_rows(self, robots: list[int], learnt: Arrays, free: Rows | None) -> None:
+        """Put robots into a state of :meth:`get_rows`."""
+        put(self, learnt, robots)
+        if self._free is not None and free is not None:
+            self._free.set_rows(robots, free)
 
     def update(self, robots: Sequence[int], measured: Measured) -> None:
         """Estimate anew for some robots that have moved."""

@@ -14,11 +14,23 @@ from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import check_fields, check_range, checked
 from ccr_gym.quantities import EnvIndex
 from ccr_gym.scales import Scales
+from ccr_gym.state import Arrays, put, take
 from solver import Transmission
 from solver.common.validation import SMALLEST
 
 Range = tuple[float, ...]
 DELAYED_KEYS = ("contact", "force_est", "force_error", "force_measured", "frames", "nodes")
+STATE = (
+    "_latency",
+    "_backlash_mm",
+    "_noise",
+    "_motor_mm",
+    "_loss",
+    "_moved_in",
+    "_history",
+    "_history_empty",
+    "rigidity_ratio",
+)  # arrays of a SensorModel
 HISTORY = 8  # observations kept, more than the largest latency
 NOISE_STEPS = 256  # steps after which the noise of an episode repeats
 
@@ -124,6 +136,14 @@ class SensorModel:
         self._noise[robot] = sampled.force_error_n
         self._motor_mm[robot], self._moved_in[robot] = motor_mm, True
         self._history_empty[robot] = True
+
+    def get_rows(self, robots: list[int]) -> Arrays:
+        """Return the state of some robots."""
+        return take(self, STATE, robots)
+
+    def set_rows(self, robots: list[int], rows: Arrays) -> None:
+        """Put robots into a state of :meth:`get_rows`."""
+        put(self, rows, robots)
 
     def move_cables(self, before_mm: np.ndarray, after_mm: np.ndarray, index: EnvIndex) -> None:
         """Note which way cables have moved, displacements ``(..., cables)`` [mm]."""

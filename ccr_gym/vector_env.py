@@ -16,6 +16,7 @@ from ccr_gym.episodes import EpisodeBatch
 from ccr_gym.quantities import Quantity
 from ccr_gym.readings import PrivilegedState
 from ccr_gym.reward import TERMS
+from ccr_gym.state import EnvState, check_state, restored
 from ccr_gym.task import MAX_STEPS, AnyTask
 from ccr_gym.tasks import TASKS, make_task
 from solver.common.validation import check_sequence, check_whole, is_listed, shown
@@ -130,6 +131,50 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             infos = _masked(infos, everything)
         rewards: Quantity = sum(terms)
         return self._observation(rows), rewards, np.zeros(self.num_envs, bool), truncated, infos
+
+    def get_state(self) -> EnvState:
+        """Return the state of all episodes and generators, with which :meth:`set_state` goes on."""
+        episodes = self._episodes.get_rows(list(range(self.num_envs))) if self._started else None
+        states = (None if generator is None else generator.bit_generator.state for generator in self._generators)
+        return EnvState(episodes, tuple(states), self._steps.copy(), self._ended.copy())
+
+    def set_state(self, state: EnvState) -> None:
+        """Put all environments into a state of :meth:`get_state`; see :meth:`ccr_gym.ContactEnv.set_state`.
+
+        Raises:
+            TypeError: If it is no such state.
+            ValueError: If it is of another number of environments, or of another robot.
+        """
+        check_state(state, self.num_envs)
+        if state.episodes is not None:
+            self._episodes.set_rows(list(range(self.num_envs)), state.episodes)
+        self._started = state.episodes is not None
+        self._generators = [restored(*pair) for pair in zip(self._generators, state.generators, strict=True)]
+        self._steps, self._ended = state.steps.copy(), state.ended.copy()
+
+    def fork(self, indices: Sequence[int]) -> None:
+        """Let every environment go on as a copy of one of them, the generator included.
+
+        Args:
+            indices: Environment that each of them becomes a copy of, N of them.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+            ValueError: If they are not N whole numbers below N.
+        """
+        self._check_started("fork")
+        wanted = check_array("indices", indices, (self.num_envs,)).astype(int)
+        if not ((wanted == np.asarray(indices)) & (wanted >= 0) & (wanted < self.num_envs)).all():
+            raise refusal("indices", indices, f"whole numbers from 0 to {self.num_envs - 1}")
+        state, chosen = self.get_state(), wanted.tolist()
+        self.set_state(
+            EnvState(
+                self._episodes.get_rows(chosen),
+                tuple(state.generators[i] for i in chosen),
+                state.steps[wanted],
+                state.ended[wanted],
+            )
+        )
 
     @property
     def action_spec(self) -> ActionSpec:

@@ -1,0 +1,82 @@
+"""States of environments, taken out and put back: planning on copies, forks, exact continuation elsewhere."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ccr_gym.checks import check_type
+from solver.common.rows import Rows
+
+Arrays = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EpisodeState:
+    """Episodes of k robots: all that their next steps depend on but the generators.
+
+    Attributes:
+        rows: The robots among their obstacles.
+        free: Robots of the estimator that nothing touches; ``None`` where it needs none.
+        episode: Set-points, time and actions.
+        estimator: What the estimator has learnt.
+        sensors: Imperfections and the observations under way; empty where sensing is ideal.
+    """
+
+    rows: Rows
+    free: Rows | None
+    episode: Arrays
+    estimator: Arrays
+    sensors: Arrays
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnvState:
+    """State of an environment, or of all of a vector environment; pickle keeps it.
+
+    Attributes:
+        episodes: The episodes; ``None`` before the first reset.
+        generators: States of the generators, one for each environment, ``None`` where it was not made yet.
+        steps: Steps of each episode, ``(N,)``.
+        ended: Whether each is to be reset, ``(N,)`` bool.
+    """
+
+    episodes: EpisodeState | None
+    generators: tuple[Mapping[str, Any] | None, ...]
+    steps: np.ndarray
+    ended: np.ndarray
+
+
+def take(owner: object, names: tuple[str, ...], robots: list[int]) -> Arrays:
+    """Return copies of the rows of arrays that are attributes of an object."""
+    return {name: getattr(owner, name)[robots] for name in names if getattr(owner, name) is not None}
+
+
+def put(owner: object, arrays: Arrays, robots: list[int]) -> None:
+    """Write rows of arrays that are attributes of an object."""
+    for name, rows in arrays.items():
+        getattr(owner, name)[robots] = rows
+
+
+def check_state(state: object, count: int) -> None:
+    """Check that a state is one of this number of environments.
+
+    Raises:
+        TypeError: If it is no state.
+        ValueError: If it is of another number of environments.
+    """
+    check_type("state", state, EnvState, "what get_state() returns")
+    assert isinstance(state, EnvState)
+    if len(state.generators) != count:
+        raise ValueError(f"state is of {len(state.generators)} environments; it must be of {count}")
+
+
+def restored(generator: np.random.Generator | None, state: Mapping[str, Any] | None) -> np.random.Generator | None:
+    """Return a generator in a state, the given one if there is one; None for none."""
+    if state is None:
+        return None
+    if generator is None:
+        generator = np.random.Generator(np.random.PCG64(0))
+    generator.bit_generator.state = state
+    return generator
