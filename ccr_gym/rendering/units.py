@@ -19,7 +19,7 @@ class Unit(NamedTuple):
         """Return a force as text, with digits that suit a full scale [N]."""
         if not math.isfinite(force):
             return "?"
-        return signed(f"{force * self.per_newton:.{decimals(full_scale * self.per_newton / 500)}f}")
+        return signed(f"{force * self.per_newton:.{decimals(full_scale * self.per_newton / 1000)}f}")
 
 
 def force_unit(full_scale: float) -> Unit:

@@ -195,8 +195,8 @@ def test_unit_of_force_follows_the_scale(scale: float, name: str) -> None:
 
 
 def test_forces_are_written_with_digits_for_their_scale() -> None:
-    assert force_unit(0.5).text(0.0957, 0.5) == "96"
-    assert force_unit(0.05).text(0.0257, 0.05) == "25.7"
+    assert force_unit(0.5).text(0.0957, 0.5) == "95.7"
+    assert force_unit(0.05).text(0.0257, 0.05) == "25.70"
     assert force_unit(10.0).text(5.083, 10.0) == "5.08"
     assert force_unit(10.0).text(math.nan, 10.0) == "?"
 
