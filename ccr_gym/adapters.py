@@ -60,6 +60,8 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         self.settings, self.layout = settings, layout
         self.actuation, self.scales = settings.actuation, settings.scales
         self.actions = self._action_spec()
+        lines = np.array(settings.robot.lines_mm)
+        self._lines_mm = lines.reshape(len(lines), 1, -1)  # across the disks
 
     @classmethod
     @abstractmethod
@@ -154,9 +156,9 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
 
     def points(self, blocks: np.ndarray) -> np.ndarray:
         """Return the points that can touch, ``(..., lines, positions, 2)`` [mm]."""
-        robot, nodes, axes = self.settings.robot, self.layout.nodes(blocks), self.layout.frames(blocks)
-        lines = np.array(robot.lines_mm)[:, None, None] * axes[..., None, :, :]
-        return subdivide(nodes[..., None, :, :2] + lines, robot.between)
+        nodes, axes = self.layout.nodes(blocks), self.layout.frames(blocks)
+        lines = nodes[..., None, :, :2] + self._lines_mm * axes[..., None, :, :]
+        return subdivide(lines, self.settings.robot.between)
 
     def pose_features(self) -> Features:
         """Return position and disk angle of every node."""
@@ -208,11 +210,9 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
 
     def points(self, blocks: np.ndarray) -> np.ndarray:
         """Return the points that can touch, ``(..., lines, positions, 3)`` [mm]."""
-        robot, nodes, frames = self.settings.robot, self.layout.nodes(blocks), self.layout.frames(blocks)
-        across = robot.lines_mm[:, None, :1], robot.lines_mm[:, None, 1:]  # along both axes of a disk
-        axes = frames[..., None, :, :, 0], frames[..., None, :, :, 1]
-        lines = across[0] * axes[0] + across[1] * axes[1]
-        return subdivide(nodes[..., None, :, :] + lines, robot.between)
+        nodes, frames = self.layout.nodes(blocks)[..., None, :, :], self.layout.frames(blocks)[..., None, :, :, :]
+        lines = nodes + self._lines_mm[..., :1] * frames[..., 0] + self._lines_mm[..., 1:] * frames[..., 1]
+        return subdivide(lines, self.settings.robot.between)
 
     def pose_features(self) -> Features:
         """Return the position of every node, and the first and last axis of its disk."""

@@ -12,17 +12,18 @@ from gymnasium import spaces
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import check_array, check_choice, check_names, check_seed, check_type, refusal
 from ccr_gym.episodes import EpisodeBatch
+from ccr_gym.goals import compute_reward, goal_space
+from ccr_gym.observation import Observation
+from ccr_gym.pictures import Pictures
 from ccr_gym.readings import ForceReading, PrivilegedState
-from ccr_gym.rendering import Frame, Renderer
 from ccr_gym.reward import TERMS
-from ccr_gym.scales import FORCE_SPAN, Scales
+from ccr_gym.scales import Scales
 from ccr_gym.settings import AnySettings
 from ccr_gym.state import EnvState, check_state, restored
 from ccr_gym.task import AnyTask, Assignment, check_force, check_task
 from solver import Equilibrium, Scene
 from solver.spatial import SpatialEquilibrium
 
-Observation = np.ndarray | dict[str, np.ndarray]
 Info = dict[str, Any]  # Gymnasium's own type of infos and options
 RENDER_MODES = ["human", "rgb_array"]
 METADATA: Info = {"render_modes": RENDER_MODES, "render_fps": 20}
@@ -45,6 +46,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
     """
 
     metadata = METADATA
+    compute_reward = staticmethod(compute_reward)
 
     def __init__(self, task: AnyTask, render_mode: str | None = None, **settings: object) -> None:
         if render_mode is not None:
@@ -52,7 +54,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self.task, self.render_mode = task, render_mode
         self.settings = make_settings(type(self).__name__, task, settings, ("task", "render_mode"))
         self._episodes = EpisodeBatch(task, self.settings, 1)
-        self._renderer: Renderer | None = None
+        self._pictures: Pictures | None = None
         self._started = False
         self.observation_space, self.action_space = single_spaces(self._episodes, self.settings)
         self._shape = (self.action_spec.size,)
@@ -85,8 +87,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             self._np_random, self._np_random_seed = generator
             raise
         self._started = True
-        if self.render_mode == "human":
-            self.render()
+        self._film(None)
         reading = self._episodes.read(0)
         return self._observation(reading), self._episodes.infos(reading, (0.0,) * len(TERMS), 0)
 
@@ -103,23 +104,37 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         episodes.step(episodes.adapter.clip(checked), 0)
         reading = episodes.read(0)
         terms = tuple(map(float, episodes.rewards(reading, 0)))
-        if self.render_mode == "human":
-            self.render()
-        return self._observation(reading), sum(terms), False, False, episodes.infos(reading, terms, 0)
+        reward = float(episodes.total_reward(reading, terms, 0))
+        self._film(reward)
+        return self._observation(reading), reward, False, False, episodes.infos(reading, terms, 0)
 
     def render(self) -> np.ndarray | None:
         """Return a picture, ``(H, W, 3)`` uint8, or show it in a window: robot, obstacles, forces and set-point."""
         if self.render_mode is None or not self._started:
             gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human', and a reset")
             return None
-        self._renderer = self._renderer or Renderer(self.metadata["render_fps"])
-        reading = self._episodes.read(0)
-        scale = FORCE_SPAN * self.settings.scales.force_n
-        frame = Frame(self.equilibrium, reading.force_true, reading.force_est, reading.desired, scale)
+        if self._pictures is None:
+            self._film(None)
+        assert self._pictures is not None
         if self.render_mode == "rgb_array":
-            return self._renderer.draw(frame)
-        self._renderer.show(frame)
+            return self._pictures.draw()
+        self._pictures.show()
         return None
+
+    def _film(self, reward: float | None) -> None:
+        """Note a step, or without a reward a reset, for the strip chart; show it in the window."""
+        if self.render_mode is None:
+            return
+        if self._pictures is None:
+            title = self.spec.id if self.spec else type(self.task).__name__
+            self._pictures = Pictures(self._episodes, title, self.metadata["render_fps"])
+            self._pictures.start([0])
+        elif reward is None:
+            self._pictures.start([0])
+        else:
+            self._pictures.add(np.array([reward]))
+        if self.render_mode == "human":
+            self._pictures.show()
 
     def get_state(self) -> EnvState:
         """Return the state of the episode and of the generator, with which :meth:`set_state` goes on.
@@ -146,13 +161,13 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self._np_random = restored(self._np_random, state.generators[0])
 
     def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_renderer": None}  # a window or canvas is made anew
+        return {**self.__dict__, "_pictures": None}  # a window or canvas is made anew
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        if self._pictures is not None:
+            self._pictures.close()
+            self._pictures = None
 
     @property
     def action_spec(self) -> ActionSpec:
@@ -199,16 +214,19 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             raise gymnasium.error.ResetNeeded(f"call reset() before {asked}")
 
     def _observation(self, reading: ForceReading) -> Observation:
-        row = self._episodes.observe(reading, 0)
-        return row if self.settings.obs_mode == "flat" else self._episodes.observer.entries(row)
+        return self._episodes.shaped(self._episodes.observe(reading, 0), reading)
 
 
 def single_spaces(episodes: EpisodeBatch, settings: AnySettings) -> tuple[spaces.Space[Observation], spaces.Box]:
     """Return the observation and action space of a single environment."""
     observer = episodes.observer
     action_space = spaces.Box(-1.0, 1.0, (episodes.actions.size,), np.float32)
-    flat = settings.obs_mode == "flat"
-    return cast("spaces.Space[Observation]", observer.flat_space if flat else observer.dict_space), action_space
+    found: spaces.Space[Any] = observer.flat_space
+    if settings.obs_mode == "dict":
+        found = observer.dict_space
+    elif settings.obs_mode == "goal":
+        found = goal_space(observer.flat_space, episodes.goal_size)
+    return cast("spaces.Space[Observation]", found), action_space
 
 
 def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others: Sequence[str]) -> AnySettings:

@@ -1,211 +1,43 @@
-"""Episodes of one task side by side: transition, observation, reward and info.
+"""Episodes of one task side by side: what is read of them, observation, reward and info.
 
 Single and vector environments are both shells around an :class:`EpisodeBatch`, so their results cannot differ.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import NamedTuple
-
 import numpy as np
 
-from ccr_gym.actions import ActionSpec
-from ccr_gym.adapters import AnyAdapter
-from ccr_gym.checks import require
-from ccr_gym.estimation import ForceEstimator, Measured
-from ccr_gym.observation import Observer
-from ccr_gym.quantities import EnvIndex, Quantity, as_scalar, norm, operations
+from ccr_gym.goals import compute_reward
+from ccr_gym.observation import Observation
+from ccr_gym.quantities import Quantity, as_scalar, norm, operations
 from ccr_gym.readings import ForceReading, PrivilegedState
 from ccr_gym.reward import SUCCESS_ERROR, TERMS, reward_terms
-from ccr_gym.sampling import Trials, check_robot
 from ccr_gym.scales import AHEAD
-from ccr_gym.sensing import Imperfections, SensorModel, sample_imperfections
-from ccr_gym.settings import AnySettings
-from ccr_gym.state import EpisodeState, put, take
-from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment
-from solver import Equilibrium
-from solver.common.batch import BaseBatch
-from solver.spatial import SpatialEquilibrium
+from ccr_gym.task import PROFILE_STEPS
+from ccr_gym.transition import ALL, Transition
 
-ALL = slice(None)
-SEEDS = 2**32
-STATE = ("_desired_n", "_goal_n", "_profiles", "_actuated_mm", "_last_actions", "_obstacle_features", "_time")
+SHOWN_FORCE = 4.0  # that fills the scale of a picture [EI/L²]
 
 
-class Pipeline(NamedTuple):
-    """The chain from solver to observation, made for scenes of a fixed number of obstacles.
-
-    Attributes:
-        batch: The robots.
-        adapter: Adapter of the robots.
-        observer: Writer of observations.
-        estimator: Estimator of the contact forces.
-        sensors: Model of the imperfections; ``None`` where sensing is ideal.
-    """
-
-    batch: BaseBatch
-    adapter: AnyAdapter
-    observer: Observer
-    estimator: ForceEstimator
-    sensors: SensorModel | None
-
-
-class EpisodeBatch:
-    """Episodes of N robots, each with obstacles and a set-point of its own.
-
-    Attributes:
-        count: Number N of robots.
-        batch: The robots.
-        adapter: Adapter of the robots.
-        observer: Writer of observations.
-
-    Args:
-        task: What an episode asks.
-        settings: Settings of the environment.
-        count: Number N of robots.
-        threads: Threads of the solver.
-
-    Raises:
-        ValueError: If an obstacle of the task could slip through the robot.
-    """
-
-    def __init__(self, task: AnyTask, settings: AnySettings, count: int, threads: int = 1) -> None:
-        check_robot(task, settings.robot)
-        self._task, self._settings, self.count, self._threads = task, settings, count, threads
-        self._target, self._vector = task.target, task.force_vector
-        self._trials = Trials(task, settings, count, threads)
-        self._use(self._make_pipeline(task.obstacles))
-        actions, space = self.adapter.actions.size, self.adapter.space
-        self._desired_n = np.ones(count)  # magnitudes of the set-points, the largest ones where they move
-        self._goal_n = np.ones((count, space))  # the set-points where they are vectors
-        self._profiles = np.ones((count, PROFILE_STEPS)) if task.moving else None
-        self._actuated_mm, self._last_actions = np.zeros((count, actions)), np.zeros((count, actions))
-        self._obstacle_features = np.zeros((count, self.adapter.obstacle_size))
-        self._time = np.zeros(count, int)  # steps of the episode
-
-    def _make_pipeline(self, obstacles: int) -> Pipeline:
-        settings, count, ranges = self._settings, self.count, self._settings.sensors
-        batch = self._task.adapter.make_batch(settings, count, obstacles, self._threads)
-        adapter = self._task.adapter(settings, batch.layout)
-        observer = Observer(adapter, self._task)
-        estimator = ForceEstimator(adapter, count, self._threads, learns=ranges is not None)
-        space, cables = adapter.space, batch.cables
-        sensors = SensorModel(count, space, cables, adapter.actions, observer.delayed) if ranges else None
-        return Pipeline(batch, adapter, observer, estimator, sensors)
-
-    def _pipeline_for(self, obstacles: int) -> Pipeline:
-        """Return the present pipeline, or a new one for another number of obstacles."""
-        present = self._pipeline.batch.layout.obstacles
-        if obstacles == present:
-            return self._pipeline
-        require(self.count == 1, f"all scenes of several robots must have {present} obstacles")
-        return self._make_pipeline(obstacles)
-
-    def _use(self, pipeline: Pipeline) -> None:
-        self._pipeline = pipeline
-        self.batch, self.adapter, self.observer, self._estimator, self._sensors = pipeline
-        self._layout = self.batch.layout
+class EpisodeBatch(Transition):
+    """Episodes of N robots; see :class:`ccr_gym.transition.Transition`."""
 
     @property
-    def actions(self) -> ActionSpec:
-        """The actuated coordinates."""
-        return self.adapter.actions
+    def goal_size(self) -> int:
+        """Numbers of a set-point, 1 or d."""
+        return self.adapter.space if self._vector else 1
 
-    def start_sampled(self, robots: Sequence[int], generators: Sequence[np.random.Generator]) -> None:
-        """Start new episodes of some robots, each sampled by its own generator.
+    @property
+    def target(self) -> int | None:
+        """Index of the obstacle whose force is regulated; ``None`` for the sum over all."""
+        return self._target
 
-        Raises:
-            RuntimeError: As :func:`ccr_gym.sampling.sample_feasible`; episodes and generators remain as they were.
-        """
-        with _restored_on_error(generators):
-            imperfections = [self._sample_imperfections(generator) for generator in generators]
-            forces, assignments = self._trials.sample_feasible(robots, generators, imperfections)
-        self._use(self._pipeline_for(self._task.obstacles))
-        for robot, assignment in zip(robots, assignments, strict=True):
-            self.batch.assign(robot, assignment.scene)
-        self._start(robots, forces, assignments, imperfections)
+    @property
+    def shown_force_n(self) -> float:
+        """Force that fills the scale of a picture [N]."""
+        return SHOWN_FORCE * self.adapter.scales.force_n
 
-    def _sample_imperfections(self, generator: np.random.Generator) -> Imperfections | None:
-        """Return the imperfections of an episode, sampled aside so that scenes are the same whatever the sensing."""
-        ranges, seed = self._settings.sensors, int(generator.integers(SEEDS))
-        if ranges is None:
-            return None
-        return sample_imperfections(ranges, self._settings.scales, self.adapter.space, np.random.default_rng(seed))
-
-    def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
-        """Start a given episode of a robot; its generator samples the imperfections.
-
-        Raises:
-            ValueError: As the solver; the present episode continues.
-        """
-        self.adapter.check_scene(self._settings, assignment.scene)
-        obstacles, least = len(assignment.scene), 1 if self._target is None else self._target + 1
-        require(obstacles >= least, f"the scene has {obstacles} obstacles; it must have at least {least}")
-        pipeline = self._pipeline_for(obstacles)
-        pipeline.batch.assign(robot, assignment.scene)
-        self._use(pipeline)
-        imperfections = [self._sample_imperfections(generator)]
-        self._start([robot], np.atleast_2d(assignment.desired_force), [assignment], imperfections)
-
-    def _start(
-        self,
-        robots: Sequence[int],
-        forces: np.ndarray,
-        assignments: Sequence[Assignment],
-        imperfections: Sequence[Imperfections | None],
-    ) -> None:
-        """Start episodes of robots that are among their obstacles, with set-points ``(k, 1)`` or ``(k, d)`` [N]."""
-        self._desired_n[robots] = forces[:, 0]
-        if self._vector:
-            self._goal_n[robots] = forces
-            self._desired_n[robots] = norm(forces)
-        self.batch.rest(robots)
-        self._estimator.rest(robots)
-        self._last_actions[robots], self._time[robots] = 0.0, 0
-        self._actuated_mm[robots] = self.adapter.actuated_mm(self.batch.blocks[robots], self._actuated_mm[robots] * 0.0)
-        for robot, assignment, sampled in zip(robots, assignments, imperfections, strict=True):
-            if self._profiles is not None:
-                self._profiles[robot] = 1.0 if assignment.profile is None else assignment.profile
-            if self._sensors is not None and sampled is not None:
-                self._sensors.begin_episode(robot, sampled, self._actuated_mm[robot])
-            if self.adapter.obstacle_size:
-                self._obstacle_features[robot] = self.adapter.obstacle_features(assignment.scene)
-
-    def step(self, actions: np.ndarray, index: EnvIndex = ALL) -> None:
-        """Move the actuated coordinates of some robots by increments.
-
-        Args:
-            actions: Their actions, as :meth:`ccr_gym.adapters.RobotAdapter.clip` returns them, ``(..., actions)``.
-            index: The robots.
-        """
-        adapter, batch, sensors = self.adapter, self.batch, self._sensors
-        increment_mm = actions * adapter.actions.increment_mm
-        if sensors is None:
-            commanded = adapter.bounded(self._actuated_mm[index] + increment_mm)
-        else:
-            commanded = sensors.apply_backlash(self._actuated_mm[index], increment_mm, index)
-            before = self._layout.cables(batch.blocks[index]).copy()
-        adapter.write_command(batch.commands, commanded, index)
-        self._last_actions[index] = actions
-        self._time[index] += 1
-        batch.move(index)
-        blocks = batch.blocks[index]
-        self._actuated_mm[index] = adapter.actuated_mm(blocks, commanded)
-        if sensors is not None:
-            sensors.move_cables(before, self._layout.cables(blocks), index)
-        self._estimate(index)
-
-    def _estimate(self, index: EnvIndex) -> None:
-        """Estimate the forces of robots that have moved."""
-        robots = np.atleast_1d(np.arange(self.count)[index]).tolist()
-        self._estimator.update(robots, self._measured(self.batch.blocks[robots], self._encoders(robots), robots))
-
-    def _measured(self, blocks: np.ndarray, actuated_mm: np.ndarray, index: EnvIndex) -> Measured:
-        """Return what is measured of robots in equilibria ``(k, size)`` with encoders that read ``(k, actions)``."""
-        tensions, onsets = self._layout.tensions(blocks), self._layout.onset(blocks)
-        if self._sensors is not None:
-            tensions, onsets = (self._sensors.motor_tensions(entry, index) for entry in (tensions, onsets))
-        return Measured(blocks, actuated_mm, tensions, onsets)
+    def steps(self, robot: int) -> int:
+        """Return the number of steps of a robot's episode."""
+        return int(self._time[robot])
 
     def read(self, index: int | slice = ALL) -> ForceReading:
         """Return the present contact forces."""
@@ -225,12 +57,6 @@ class EpisodeBatch:
         else:
             goal, error = desired, abs(force - desired) / desired
         return ForceReading(blocks, force_true, chosen, paper, regulated, force, desired, goal, error)
-
-    def _forces(self, blocks: np.ndarray) -> np.ndarray:
-        """Return the regulated contact force of robots of nominal rigidity, ``(..., d)`` [N]."""
-        if self._target is None:
-            return self._layout.force(blocks)
-        return self._layout.forces(blocks)[..., self._target, :]
 
     def _desired(self, ahead: int, index: int | slice) -> Quantity:
         """Return the magnitude of the set-point some steps ahead [N]."""
@@ -257,9 +83,27 @@ class EpisodeBatch:
         self.observer.write_encoders(rows, self._encoders(index))
         return self.observer.clip(rows)
 
-    def _encoders(self, index: EnvIndex) -> np.ndarray:
-        """Return the actuated coordinates that the encoders of the motors read, ``(..., actions)`` [mm]."""
-        return np.asarray(self._actuated_mm[index] if self._sensors is None else self._sensors.motor_mm(index))
+    def shaped(self, rows: np.ndarray, reading: ForceReading) -> Observation:
+        """Return flat observations in the form that the settings ask for."""
+        mode = self._settings.obs_mode
+        if mode == "flat":
+            return rows
+        if mode == "dict":
+            return self.observer.entries(rows)
+        achieved, desired = self.goals(reading)
+        return {"achieved_goal": achieved, "desired_goal": desired, "observation": rows}
+
+    def goals(self, reading: ForceReading) -> tuple[np.ndarray, np.ndarray]:
+        """Return regulated forces and set-points as goals, ``(..., 1)`` or ``(..., d)`` float32."""
+        achieved = reading.regulated if self._vector else np.asarray(reading.force)[..., None]
+        desired = reading.goal if self._vector else np.asarray(reading.goal)[..., None]
+        return self.observer.as_goal(achieved), self.observer.as_goal(desired)
+
+    def total_reward(self, reading: ForceReading, terms: tuple[Quantity, ...], index: int | slice = ALL) -> Quantity:
+        """Return the reward: the sum of the terms, or that of goal-conditioned environments."""
+        if self._settings.obs_mode != "goal":
+            return sum(terms)
+        return as_scalar(compute_reward(*self.goals(reading)), index)
 
     def rewards(self, reading: ForceReading, index: int | slice = ALL) -> tuple[Quantity, ...]:
         """Return the reward terms of the last step."""
@@ -297,59 +141,3 @@ class EpisodeBatch:
         rigidity_ratio = as_scalar(sensors.rigidity_ratio[index], index)
         motor, half_backlash = sensors.motor_mm(index), sensors.half_backlash_mm(index)
         return PrivilegedState(force, rigidity_ratio, goal, actuated, motor, half_backlash)
-
-    def probe(self, actuated_mm: np.ndarray) -> np.ndarray:
-        """Return the contact forces that all robots would have at other actuated coordinates; nothing moves.
-
-        Args:
-            actuated_mm: Actuated coordinates, ``(N, actions)`` [mm]; clipped to their bounds.
-
-        Returns:
-            Regulated contact forces, ``(N, d)`` [N].
-        """
-        commands, actuated_mm = self.batch.commands.copy(), self.adapter.bounded(actuated_mm)
-        self.adapter.write_command(commands, actuated_mm, ALL)
-        blocks = self.batch.probe(commands)
-        forces = self._forces(blocks)
-        if self._settings.regulate == "estimate":
-            factors = self._estimator.probe(self._measured(blocks, actuated_mm, ALL))
-            return np.asarray(factors[:, None] * forces)
-        return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
-
-    def get_rows(self, robots: list[int]) -> EpisodeState:
-        """Return the states of the episodes of some robots."""
-        learnt, free = self._estimator.get_rows(robots)
-        sensors = {} if self._sensors is None else self._sensors.get_rows(robots)
-        return EpisodeState(self.batch.get_rows(robots), free, take(self, STATE, robots), learnt, sensors)
-
-    def set_rows(self, robots: list[int], state: EpisodeState) -> None:
-        """Put robots into states of :meth:`get_rows`, from which they go on with the same bits.
-
-        Raises:
-            ValueError: If they are states of other robots.
-        """
-        scenes = {len(scene) for scene in state.rows.scenes if scene is not None}
-        self._use(self._pipeline_for(scenes.pop() if scenes else self._task.obstacles))
-        self.batch.set_rows(robots, state.rows)
-        self._estimator.set_rows(robots, state.estimator, state.free)
-        put(self, state.episode, robots)
-        if self._sensors is not None:
-            self._sensors.set_rows(robots, state.sensors)
-
-    def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:
-        """Return a robot's present equilibrium; it is immutable."""
-        equilibrium = self.batch.equilibrium(robot)
-        assert isinstance(equilibrium, Equilibrium | SpatialEquilibrium)
-        return equilibrium
-
-
-@contextmanager
-def _restored_on_error(generators: Sequence[np.random.Generator]) -> Iterator[None]:
-    """Restore the states of generators after any exception."""
-    states = [generator.bit_generator.state for generator in generators]
-    try:
-        yield
-    except BaseException:
-        for generator, state in zip(generators, states, strict=True):
-            generator.bit_generator.state = state
-        raise

@@ -11,6 +11,7 @@ from ccr_gym.scales import AHEAD, FORCE_SPAN
 from ccr_gym.sensing import DELAYED_KEYS
 from ccr_gym.task import AnyTask
 
+Observation = np.ndarray | dict[str, np.ndarray]
 SENSOR_KEYS = ("force_error", "force_measured")  # absent without a force sensor
 NOT_NEGATIVE = ("length", "desired_ahead", "contact")
 ENCODER_KEYS = ("cable", "length")  # what the encoders read, in the order of the actions
@@ -98,6 +99,10 @@ class Observer:
     def slices(self) -> dict[str, slice]:
         """Columns of the named entries."""
         return dict(self._columns)
+
+    def as_goal(self, forces: np.ndarray) -> np.ndarray:
+        """Return forces [N] as goals within the bounds of their space, float32."""
+        return np.asarray(np.clip(forces / self._force_n, -1.0, 1.0), np.float32)
 
     def entries(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Return the named entries of flat observations ``(..., k)``, as views."""

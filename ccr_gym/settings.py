@@ -72,7 +72,9 @@ class BaseSettings(Generic[RobotT]):
             paper's prototype.
         model: Model of a robot that is given by name, by its fields or not at all: ``"rod"``, or ``"paper"`` for the
             paper's system to the letter.
-        obs_mode: Form of the observation: ``"flat"``, or ``"dict"`` for its named parts.
+        obs_mode: Form of the observation: ``"flat"``, ``"dict"`` for its named parts, or ``"goal"`` for a
+            goal-conditioned environment with ``observation``, ``achieved_goal`` and ``desired_goal``, whose reward is
+            ``−min(|F − F_d| / F_d, 1)``.
         force_sensor: Whether the measured contact force is observed beside the estimate.
         max_increment_mm: Cable displacement of a full action [mm]; ``None`` stands for a/16, shared by the sections.
         cable_limit_mm: Largest cable displacement that actions can command [mm]; ``None`` stands for 1.75 a, shared by
@@ -94,7 +96,7 @@ class BaseSettings(Generic[RobotT]):
 
     robot: RobotT
     model: Literal["rod", "paper"] = checked("rod", check_choice, choices=("rod", "paper"))
-    obs_mode: Literal["dict", "flat"] = checked("flat", check_choice, choices=("dict", "flat"))
+    obs_mode: Literal["flat", "dict", "goal"] = checked("flat", check_choice, choices=("flat", "dict", "goal"))
     force_sensor: bool = checked(True, check_flag)
     max_increment_mm: float = derived(check_number, low=SMALLEST)
     cable_limit_mm: float = derived(check_number, low=SMALLEST)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -11,22 +12,26 @@ from gymnasium.vector.utils import batch_space
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import as_array, check_array, check_choice, check_seed, check_type, refusal, require
-from ccr_gym.contact_env import METADATA, Info, Observation, make_settings, single_spaces
+from ccr_gym.contact_env import METADATA, Info, make_settings, single_spaces
 from ccr_gym.episodes import EpisodeBatch
+from ccr_gym.goals import compute_reward
+from ccr_gym.observation import Observation
+from ccr_gym.pictures import Pictures
 from ccr_gym.quantities import Quantity
 from ccr_gym.readings import PrivilegedState
 from ccr_gym.reward import TERMS
+from ccr_gym.shared import SharedAttributes, entry_of, masked
 from ccr_gym.state import EnvState, check_state, restored
 from ccr_gym.task import MAX_STEPS, AnyTask
 from ccr_gym.tasks import TASKS, make_task
-from solver.common.validation import check_sequence, check_whole, is_listed, shown
+from solver.common.validation import check_sequence, check_whole, is_listed
 
 MAX_ENVS = 65_536
 THREADS_PER_CORE = 4
 ARGUMENTS = ("task", "num_envs", "max_episode_steps", "autoreset_mode", "threads", "render_mode")
 
 
-class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
+class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.ndarray]):
     """Many :class:`ccr_gym.ContactEnv` of one task, moved by one call of the solver.
 
     Results are bit-identical to those of ``gymnasium.vector.SyncVectorEnv``, for any number of threads.
@@ -38,13 +43,15 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         autoreset_mode: When an environment is reset after the end of an episode: in the next step (``"NextStep"``), in
             the last step (``"SameStep"``), or by the caller (``"Disabled"``).
         threads: Threads of the solver, up to four per core.
-        render_mode: ``None``; only single environments are rendered.
+        render_mode: ``None``, or ``"rgb_array"`` for pictures of all environments.
         **settings: Fields of the task's settings, as :class:`ccr_gym.Settings`.
 
     Raises:
         TypeError: If an argument is unknown, or an object of the wrong class.
         ValueError: If an argument is out of range; the message names the bound.
     """
+
+    compute_reward = staticmethod(compute_reward)
 
     def __init__(
         self,
@@ -53,10 +60,13 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
-        render_mode: None = None,
+        render_mode: str | None = None,
         **settings: object,
     ) -> None:
-        require(render_mode is None, f"render_mode is {shown(render_mode)}; use vectorization_mode='sync' to render")
+        if render_mode is not None:
+            check_choice("render_mode", render_mode, choices=["rgb_array"])
+        self.render_mode = render_mode
+        self._pictures: Pictures | None = None
         self.task, self.settings = task, make_settings(type(self).__name__, task, settings, ARGUMENTS)
         self.num_envs = num_envs = check_whole("num_envs", num_envs, 1, MAX_ENVS)
         most, reason = THREADS_PER_CORE * (os.cpu_count() or 1), f"{THREADS_PER_CORE} for each core of this machine"
@@ -100,9 +110,11 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._start(np.flatnonzero(mask), generators)
         self._generators = generators
         self._started = True
+        self._film(np.flatnonzero(mask).tolist(), None)
         reading = self._episodes.read()
         terms = tuple(np.zeros((len(TERMS), self.num_envs)))
-        return self._observation(self._episodes.observe(reading)), _masked(self._episodes.infos(reading, terms), mask)
+        rows = self._episodes.observe(reading)
+        return self._episodes.shaped(rows, reading), masked(self._episodes.infos(reading, terms), mask)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
         """Move the cables, and reset environments as the autoreset mode says.
@@ -123,14 +135,17 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         for term in terms:
             term[resetting] = 0.0
         truncated = self._steps >= self.max_episode_steps
-        rows, infos = self._episodes.observe(reading), self._episodes.infos(reading, terms)
+        rewards = self._episodes.total_reward(reading, terms)
+        rewards[resetting] = 0.0
+        observation = self._episodes.shaped(self._episodes.observe(reading), reading)
+        infos = self._episodes.infos(reading, terms)
         self._ended = truncated.copy()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and truncated.any():
-            rows, infos = self._restart(truncated, rows, infos, terms)
+            observation, infos = self._restart(truncated, observation, infos, terms)
         else:
-            infos = _masked(infos, everything)
-        rewards: Quantity = sum(terms)
-        return self._observation(rows), rewards, np.zeros(self.num_envs, bool), truncated, infos
+            infos = masked(infos, everything)
+        self._film(np.flatnonzero(resetting).tolist(), rewards)
+        return observation, rewards, np.zeros(self.num_envs, bool), truncated, infos
 
     def get_state(self) -> EnvState:
         """Return the state of all episodes and generators, with which :meth:`set_state` goes on."""
@@ -175,6 +190,40 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
                 state.ended[wanted],
             )
         )
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Return a picture of each environment, N of ``(H, W, 3)`` uint8."""
+        return self.pictures_of(range(self.num_envs))
+
+    def pictures_of(self, indices: Sequence[int]) -> tuple[np.ndarray, ...] | None:
+        """Return pictures of some environments; see :func:`ccr_gym.rendering.tile` for one picture of several."""
+        if self.render_mode is None or not self._started:
+            gymnasium.logger.warn("render() needs render_mode='rgb_array', and a reset")
+            return None
+        self._film([], None)
+        assert self._pictures is not None
+        return tuple(self._pictures.draw(index) for index in indices)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free what pictures need."""
+        if self._pictures is not None:
+            self._pictures.close()
+            self._pictures = None
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "_pictures": None}  # a canvas is made anew
+
+    def _film(self, started: list[int], rewards: np.ndarray | None) -> None:
+        """Note a step, and resets of some environments, for the strip charts."""
+        if self.render_mode is None:
+            return
+        if self._pictures is None:
+            title = self.spec.id if self.spec else type(self.task).__name__
+            self._pictures = Pictures(self._episodes, title, self.metadata["render_fps"])
+            started, rewards = list(range(self.num_envs)), None
+        if rewards is not None:
+            self._pictures.add(rewards)
+        self._pictures.start(started)
 
     @property
     def action_spec(self) -> ActionSpec:
@@ -243,28 +292,26 @@ class ContactVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._episodes.step(actions[moving], moving.tolist())
 
     def _restart(
-        self, ended: np.ndarray, rows: np.ndarray, infos: Info, terms: tuple[np.ndarray, ...]
-    ) -> tuple[np.ndarray, Info]:
+        self, ended: np.ndarray, observation: Observation, infos: Info, terms: tuple[np.ndarray, ...]
+    ) -> tuple[Observation, Info]:
         """Start new episodes where some have ended, whose last observation and info go into the info."""
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
-            final[i] = self._observation(rows[i])
-        final_infos = {"final_obs": final, "_final_obs": ended.copy(), "final_info": _masked(infos, ended)}
+            final[i] = entry_of(observation, int(i))
+        final_infos = {"final_obs": final, "_final_obs": ended.copy(), "final_info": masked(infos, ended)}
         final_infos["_final_info"] = ended.copy()
         self._start(np.flatnonzero(ended), self._generators)
         self._ended = np.zeros(self.num_envs, bool)
         reading, everything = self._episodes.read(), np.ones(self.num_envs, bool)
         terms = tuple(np.where(ended, 0.0, term) for term in terms)
-        return self._episodes.observe(reading), _masked(self._episodes.infos(reading, terms), everything) | final_infos
+        restarted = self._episodes.shaped(self._episodes.observe(reading), reading)
+        return restarted, masked(self._episodes.infos(reading, terms), everything) | final_infos
 
     def _start(self, robots: np.ndarray, generators: list[np.random.Generator | None]) -> None:
         indices = robots.tolist()
         self._episodes.start_sampled(indices, [generator for i in indices if (generator := generators[i]) is not None])
         self._steps[robots] = 0
         self._ended[robots] = False
-
-    def _observation(self, rows: np.ndarray) -> Observation:
-        return rows if self.settings.obs_mode == "flat" else self._episodes.observer.entries(rows)
 
 
 def make_vector_env(
@@ -286,17 +333,3 @@ def _autoreset_mode(mode: object) -> AutoresetMode:
     if isinstance(mode, AutoresetMode):
         return mode
     return AutoresetMode(check_choice("autoreset_mode", mode, choices=[known.value for known in AutoresetMode]))
-
-
-def _masked(infos: Info, mask: np.ndarray) -> Info:
-    """Return infos in Gymnasium's form: zero outside the mask, and the mask beside every entry."""
-    masked: Info = {}
-    for key, value in infos.items():
-        if isinstance(value, dict):
-            masked[key] = _masked(value, mask)
-        elif mask.all():
-            masked[key] = value
-        else:
-            masked[key] = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type())
-        masked[f"_{key}"] = mask.copy()
-    return masked

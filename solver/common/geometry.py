@@ -9,6 +9,8 @@ from solver.common.scene import Scene
 
 def subdivide(lines: np.ndarray, between: int) -> np.ndarray:
     """Return lines ``(..., n+1, d)`` with ``between`` evenly spaced points added between every two."""
+    if between == 0:
+        return lines
     segments = lines.shape[-2] - 1
     position = np.arange(segments * (between + 1) + 1) / (between + 1)
     node = np.minimum(position.astype(int), segments - 1)

@@ -104,7 +104,9 @@ def test_rigidity_scales_forces_and_keeps_shapes():
     for (observed, info), (other, other_info) in zip(soft, stiff, strict=True):
         assert np.array_equal(observed["nodes"], other["nodes"])
         assert other_info["force_true"] == pytest.approx(4 * info["force_true"])
-        assert other_info["force_est"] == pytest.approx(4 * info["force_est"], rel=0.01)  # the rigidity is learnt, with a prior of 1
+        assert other_info["force_est"] == pytest.approx(
+            4 * info["force_est"], rel=0.01
+        )  # the rigidity is learnt, with a prior of 1
         touched |= bool(info["force_true"].any())
     assert touched
 

@@ -1,0 +1,24 @@
+"""The goal-conditioned form of an environment, for hindsight relabelling: the goal is the desired force."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+
+def goal_space(flat: spaces.Box, size: int) -> spaces.Dict:
+    """Return the space of goal-conditioned observations, with goals of a size, 1 or d [FORCE_SPAN EI/L²]."""
+    goal = spaces.Box(np.full(size, -1.0 if size > 1 else 0.0, np.float32), np.ones(size, np.float32))
+    return spaces.Dict({"achieved_goal": goal, "desired_goal": goal, "observation": flat})
+
+
+def compute_reward(achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Any = None) -> np.ndarray:
+    """Return ``−min(|F − F_d| / |F_d|, 1)``, the reward of goal-conditioned environments, ``(...)``.
+
+    Args:
+        achieved_goal: Forces F, ``(..., 1)`` or ``(..., d)``, in any unit.
+        desired_goal: Set-points F_d, likewise.
+        info: Not used.
+    """
+    error, desired = achieved_goal.astype(float) - desired_goal, desired_goal.astype(float)
+    return np.asarray(-np.minimum(np.linalg.norm(error, axis=-1) / np.linalg.norm(desired, axis=-1), 1.0))
