@@ -104,15 +104,15 @@ class RowBatch(ABC, Generic[RobotT_co]):
         """
         indices = self._check_indices(robots)
         self._check_rows(rows, len(indices))
-        pairs = zip(indices, rows.scenes, strict=True)
+        pairs = list(zip(indices, rows.scenes, strict=True))
         changed = [(index, scene) for index, scene in pairs if scene is not None and scene != self._scenes[index]]
         compiled = {scene: self._compile(scene) for scene in {scene for _, scene in changed}}
         with self._exclusive:
             for index, scene in changed:
                 self._kernel_batch.set_obstacles(index, compiled[scene])
-            for index, scene, rested in zip(indices, rows.scenes, rows.rested.tolist(), strict=True):
-                self._scenes[index] = scene
-                (self._unrested.discard if rested and scene is not None else self._unrested.add)(index)
+            for (index, given), rested in zip(pairs, rows.rested.tolist(), strict=True):
+                self._scenes[index] = given
+                (self._unrested.discard if rested and given is not None else self._unrested.add)(index)
             for name in NUMBERS:
                 getattr(self, name)[indices] = getattr(rows, name)
 

@@ -1,0 +1,51 @@
+"""The goal-conditioned form: its reward can be computed anew for any goal."""
+
+import gymnasium
+import numpy as np
+import pytest
+from stable_baselines3.common.env_checker import check_env
+
+import ccr_gym
+from ccr_gym import FORCE_SPAN
+
+EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
+
+
+@EVERY_ID
+def test_rewards_follow_from_the_goals(env_id):
+    env = gymnasium.make(env_id, obs_mode="goal").unwrapped
+    check_env(env)
+    unit = FORCE_SPAN * env.settings.scales.force_n
+    regulated = "force_est" if env.settings.regulate == "estimate" else "force_true"
+    env.reset(seed=1)
+    for _ in range(30):
+        observation, reward, _, _, info = env.step(np.full(env.action_space.shape, 0.5, np.float32))
+        achieved, desired = observation["achieved_goal"], observation["desired_goal"]
+        assert reward == env.compute_reward(achieved, desired, info)
+        force = np.linalg.norm(info[regulated])
+        assert unit * achieved == pytest.approx(force, rel=1e-6, abs=1e-9)
+        wanted = -min(abs(force - info["desired_force"]) / info["desired_force"], 1)
+        assert reward == pytest.approx(wanted, abs=1e-5)
+    assert env.compute_reward(np.array([[0.2], [0.3]]), np.array([[0.2], [0.2]])) == pytest.approx([0, -0.5])
+
+
+def test_vector_environments_agree_with_single_ones():
+    modes = ("vector_entry_point", "sync")
+    envs = [
+        gymnasium.make_vec("CCR/PushObstacle-v1", 3, vectorization_mode=mode, obs_mode="goal", max_episode_steps=9)
+        for mode in modes
+    ]
+    seen = [env.reset(seed=3)[0] for env in envs]
+    for _ in range(25):
+        assert all(np.array_equal(seen[0][key], seen[1][key]) for key in seen[1])
+        steps = [env.step(np.full((3, 1), 0.7, np.float32)) for env in envs]
+        seen = [step[0] for step in steps]
+        assert np.array_equal(steps[0][1], steps[1][1])
+
+
+def test_force_vectors_are_goals_of_as_many_numbers():
+    env = gymnasium.make("CCR/SpatialPush-v1", obs_mode="goal", task={"force_vector": True}).unwrapped
+    observation, info = env.reset(seed=0)
+    assert observation["desired_goal"].shape == (3,)
+    unit = FORCE_SPAN * env.settings.scales.force_n
+    assert unit * observation["desired_goal"] == pytest.approx(info["desired_force"], abs=1e-6)

@@ -1,0 +1,155 @@
+"""States are taken out and put back, copied, pickled and forked; whatever continues, continues with the same bits."""
+
+import copy
+import multiprocessing
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from comparison import same
+
+import ccr_gym
+from solver import Circle
+
+EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
+EVERY_SENSING = pytest.mark.parametrize("sensing", ["ideal", "realistic"])
+STEPS = 80
+
+
+def make(env_id, **kwargs):
+    return gymnasium.make(env_id, disable_env_checker=True, **kwargs).unwrapped
+
+
+def make_vec(env_id, count=4, **kwargs):
+    return gymnasium.make_vec(env_id, count, vectorization_mode="vector_entry_point", max_episode_steps=30, **kwargs)
+
+
+def actions_of(env, steps=STEPS):
+    generator = np.random.default_rng(5)
+    return np.clip(generator.normal(0.3, 0.6, (steps, *env.action_space.shape)), -1, 1).astype(np.float32)
+
+
+def go_on(env, actions):
+    """Return what an environment returns from here on, a reset included."""
+    return [*(env.step(action) for action in actions[:-1]), env.reset(), env.step(actions[-1])]
+
+
+def go_on_elsewhere(pickled, state, actions, results):
+    """Continue two copies in another process."""
+    env = pickle.loads(pickled)
+    other = copy.deepcopy(env)
+    other.reset(seed=99)
+    other.set_state(state)
+    results.put((go_on(env, actions), go_on(other, actions)))
+
+
+@EVERY_ID
+@EVERY_SENSING
+def test_copies_continue_with_the_same_bits(env_id, sensing):
+    env = make(env_id, sensing=sensing)
+    env.reset(seed=2)
+    actions = actions_of(env)
+    for action in actions[:25]:
+        env.step(action)
+    state, copies = env.get_state(), [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    fresh = make(env_id, sensing=sensing)
+    fresh.set_state(pickle.loads(pickle.dumps(state)))
+    going = go_on(env, actions[25:])
+    for other in (*copies, fresh):
+        same(tuple(going), tuple(go_on(other, actions[25:])))
+    env.set_state(state)
+    same(tuple(going), tuple(go_on(env, actions[25:])))
+
+
+@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/SpatialPush-v1"])
+def test_copies_continue_in_another_process(env_id):
+    env = make(env_id, sensing="realistic")
+    env.reset(seed=2)
+    actions = actions_of(env, 40)
+    for action in actions[:20]:
+        env.step(action)
+    context = multiprocessing.get_context("spawn")
+    results = context.Queue()
+    arguments = pickle.dumps(env), env.get_state(), actions[20:], results
+    process = context.Process(target=go_on_elsewhere, args=arguments)
+    process.start()
+    elsewhere = results.get(timeout=120)
+    process.join()
+    going = go_on(env, actions[20:])
+    for other in elsewhere:
+        same(tuple(going), tuple(other))
+
+
+@EVERY_ID
+@EVERY_SENSING
+def test_vector_environments_continue_with_the_same_bits(env_id, sensing):
+    env = make_vec(env_id, sensing=sensing)
+    env.reset(seed=2)
+    actions = actions_of(env)
+    for action in actions[:25]:
+        env.step(action)
+    copies = [copy.deepcopy(env), pickle.loads(pickle.dumps(env)), make_vec(env_id, sensing=sensing)]
+    copies[-1].set_state(env.get_state())
+    going = go_on(env, actions[25:])
+    for other in copies:
+        same(tuple(going), tuple(go_on(other, actions[25:])))
+
+
+@EVERY_SENSING
+def test_forks_are_copies_that_part_by_their_actions(sensing):
+    env = make_vec("CCR/PushObstacle-v1", sensing=sensing)
+    env.reset(seed=1)
+    for action in actions_of(env, 20):
+        env.step(action)
+    twin = copy.deepcopy(env)
+    env.fork([2, 2, 0, 3])
+    action = np.full((4, 1), 0.5, np.float32)
+    forked, going = env.step(action)[0], twin.step(action)[0]
+    assert np.array_equal(forked, going[[2, 2, 0, 3]])
+    action[1] = -0.5
+    forked = env.step(action)[0]
+    assert not np.array_equal(forked[0], forked[1])
+    assert np.array_equal(env.reset()[0][:2], twin.reset()[0][[2, 2]])  # the generators are copies, too
+
+
+def test_states_hold_scenes_of_another_number_of_obstacles():
+    env = make("CCR/PushObstacle-v1")
+    scene = [Circle(center=(44.0, 104.0), radius=12), Circle(center=(60.0, 150.0), radius=12)]
+    env.reset(options={"scene": scene, "desired_force": 0.1})
+    env.step(np.ones(1, np.float32))
+    state = env.get_state()
+    env.reset(seed=0)
+    env.set_state(state)
+    assert len(env.equilibrium.scene) == 2
+    assert env.equilibrium.cable_mm == 0.5
+
+
+@pytest.mark.parametrize(
+    ("state", "error", "message"),
+    [
+        (lambda: None, TypeError, "what get_state"),
+        (lambda: make_vec("CCR/PushObstacle-v1").get_state(), ValueError, "4 environments; it must be of 1"),
+    ],
+)
+def test_other_states_are_refused_and_change_nothing(state, error, message):
+    env = make("CCR/PushObstacle-v1")
+    env.reset(seed=0)
+    before = env.step(np.ones(1, np.float32))[0]
+    with pytest.raises(error, match=message):
+        env.set_state(state())
+    other = make("CCR/PushObstacle-v1", robot="guidewire")
+    other.reset(seed=0)
+    with pytest.raises(ValueError, match="another robot"):
+        env.set_state(other.get_state())
+    assert np.array_equal(env.step(np.zeros(1, np.float32))[0], before)
+
+
+@pytest.mark.parametrize("indices", [[0, 1], [0, 1, 2, 4], [-1, 0, 0, 0], [0.5, 0, 0, 0], None])
+def test_forks_of_no_environment_are_refused(indices):
+    env = make_vec("CCR/PushObstacle-v1")
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.fork([0, 1, 2, 3])
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="indices is"):
+        env.fork(indices)
