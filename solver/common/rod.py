@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -175,13 +176,21 @@ def _checked_cables(robot: AnyRod, space: int, usual: tuple[Cable, ...]) -> tupl
 
 
 def _full(robot: AnyRod, cable: Cable) -> Cable:
-    offset = robot.offset_mm if cable.offset_mm is None else cable.offset_mm
-    return replace(cable, offset_mm=offset, end=robot.segments if cable.end is None else cable.end)
+    return _filled((cable,), robot.offset_mm, robot.segments)[0]
+
+
+@lru_cache(maxsize=256)
+def _filled(cables: tuple[Cable, ...], offset_mm: float, segments: int) -> tuple[Cable, ...]:
+    def filled(cable: Cable) -> Cable:
+        offset = offset_mm if cable.offset_mm is None else cable.offset_mm
+        return replace(cable, offset_mm=offset, end=segments if cable.end is None else cable.end)
+
+    return tuple(map(filled, cables))
 
 
 def full_cables(robot: AnyRod) -> tuple[Cable, ...]:
     """Return the cables of a robot with offset and end filled in."""
-    return tuple(_full(robot, cable) for cable in robot.cables)
+    return _filled(tuple(robot.cables), robot.offset_mm, robot.segments)
 
 
 def bending_ratios(robot: AnyRod) -> np.ndarray:
