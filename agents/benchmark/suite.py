@@ -178,7 +178,7 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
             episode = run_episode(policy, entry.env_id, seed + i, keep, **kwargs)
             rows.append(tuple(asdict(measure(episode)).values()))
             statuses.update(status.name for status in episode.statuses)
-            steps, seconds = steps + len(episode.true), seconds + episode.seconds
+            steps, seconds = steps + len(episode.force), seconds + episode.seconds
             if keep:
                 shown.append(episode)
     if video is not None:

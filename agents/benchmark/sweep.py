@@ -61,18 +61,18 @@ def _policy(trial: optuna.Trial, config: SweepConfig) -> Policy:
         return PredictiveController(_mpc(trial))
     if config.what == "Newton":
         return NewtonController(gain=trial.suggest_float("gain", 0.2, 1.0))
-    proportional = trial.suggest_float("proportional", 0.0, 100.0) if config.what == "PI" else 0.0
-    return ForceController(proportional, trial.suggest_float("integral", 1.0, 100.0, log=True))
+    proportional = trial.suggest_float("proportional", 0.0, 4.0) if config.what == "PI" else 0.0
+    return ForceController(proportional, trial.suggest_float("integral", 0.05, 4.0, log=True))
 
 
 def _mpc(trial: optuna.Trial) -> MPCSettings:
     return MPCSettings(
         effort=trial.suggest_float("effort", 0.001, 10.0, log=True),
-        slope=trial.suggest_float("slope", 0.001, 1.0, log=True),
-        least_slope=trial.suggest_float("least_slope", 0.001, 0.3, log=True),
-        trust=trial.suggest_float("trust", 1e-4, 1.0, log=True),
-        stiffening=trial.suggest_float("stiffening", 0.01, 1.0, log=True),
-        width_mm=trial.suggest_float("width_mm", 0.02, 2.0, log=True),
+        slope=trial.suggest_float("slope", 0.1, 40.0, log=True),
+        least_slope=trial.suggest_float("least_slope", 0.1, 10.0, log=True),
+        trust=trial.suggest_float("trust", 1e-6, 0.01, log=True),
+        stiffening=trial.suggest_float("stiffening", 0.1, 10.0, log=True),
+        width=trial.suggest_float("width", 0.005, 0.25, log=True),
     )
 
 
