@@ -24,6 +24,7 @@ from agents.tuned import (
     PPOSettings,
     RecurrentPPOSettings,
     SACSettings,
+    sensing_of,
 )
 
 
@@ -48,9 +49,8 @@ def sweep(config: SweepConfig) -> optuna.Study:
 
 def _score(trial: optuna.Trial, config: SweepConfig) -> float:
     """Return the interquartile mean of the force error on training scenes [mN]."""
-    errors = scores(
-        _policy(trial, config), config.env_id, VALIDATION_SEED, config.episodes, sensing="realistic", split="train"
-    )
+    kwargs = {"sensing": sensing_of(config.env_id), "split": "train"}
+    errors = scores(_policy(trial, config), config.env_id, VALIDATION_SEED, config.episodes, **kwargs)
     return float(iqm(errors))
 
 
@@ -80,7 +80,8 @@ def _learned(trial: optuna.Trial, config: SweepConfig) -> Policy:
     """Return a policy that was trained with the settings of a trial."""
     settings = _settings(trial, replace(LEARNERS[config.what](), steps=config.steps))
     run = config.out / f"{config.what}-{folder_name(config.env_id)}-{trial.number}"
-    return LearnedPolicy(training.train(TrainConfig(run=run, env_id=config.env_id, learner=settings), progress=False))
+    trained = TrainConfig(run=run, env_id=config.env_id, sensing=sensing_of(config.env_id), learner=settings)
+    return LearnedPolicy(training.train(trained, progress=False))
 
 
 def _settings(trial: optuna.Trial, base: LearnerSettings) -> LearnerSettings:

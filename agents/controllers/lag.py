@@ -10,6 +10,7 @@ from solver.spatial import SpatialRobot
 
 LATENCIES = 7  # candidates, in steps from 0
 HALF_BACKLASHES = np.linspace(0.0, 0.05, 41)  # candidates [a]
+TIE = 1e-9 * HALF_BACKLASHES  # errors at first: of pairs that explain a steady motion alike, the smallest backlash
 ALL = slice(None)
 
 
@@ -32,14 +33,14 @@ class LagEstimator:
 
     def __init__(self, count: int, commands: int) -> None:
         self._predicted = np.zeros((count, LATENCIES, commands, HALF_BACKLASHES.size))  # latest first
-        self._errors = np.zeros((count, LATENCIES, HALF_BACKLASHES.size))
+        self._errors = np.zeros((count, LATENCIES, HALF_BACKLASHES.size)) + TIE
         self._fresh = np.ones(count, bool)
         self.latency, self.half_backlash = np.zeros(count, int), np.zeros(count)
         self.cables, self.observed = np.zeros((count, commands)), np.zeros((count, commands))
 
     def reset(self, index: EnvIndex = ALL) -> None:
         """Start new episodes of some robots."""
-        self._errors[index], self._fresh[index] = 0.0, True
+        self._errors[index], self._fresh[index] = TIE, True
 
     def update(self, motors: np.ndarray, observed: np.ndarray, index: EnvIndex = ALL) -> None:
         """Take in the next step of some robots.

@@ -10,7 +10,7 @@ from agents.controllers.lag import LagEstimator, observed_commands
 from agents.controllers.tare import Tare
 from agents.environment import Environment, require_env
 from agents.policy import Observation, search, set_points
-from agents.tuned import MPC, MPCSettings
+from agents.tuned import MPCSettings
 
 SMALLEST = 6e-4  # move that is worth crossing the backlash [a]
 
@@ -36,11 +36,6 @@ class PredictiveController:
     _lag: LagEstimator = field(default_factory=lambda: LagEstimator(1, 1), init=False)
     _tare: Tare = field(default_factory=Tare, init=False)
     _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
-
-    @classmethod
-    def tuned(cls, env_id: str) -> "PredictiveController":
-        """Return the controller with the settings that were best on training scenes with realistic sensing."""
-        return cls(MPC.get(env_id, MPCSettings()))
 
     def reset(self, env: Environment | None = None) -> None:
         """Forget the episode and take the robot and the range of its motors from the environment.

@@ -12,6 +12,7 @@ from agents.tuned import NEWTON_GAIN
 from ccr_gym import FORCE_SPAN, ActionSpec, PrivilegedState, Scales
 
 PROBE = 1e-4  # trial move of a finite difference [a]
+REACHED = 1e-9  # force error that is roundoff, for which no motor crosses its backlash [EI/L²]
 PRIOR = np.full(2, 4e-5)  # a reading at the resolution of a sensor that agrees with the model [(EI/L²)²]
 
 
@@ -74,6 +75,7 @@ class NewtonController:
             slopes, missing = slopes @ (state.force / size)[:, None], np.array([state.goal - size])
         else:
             missing = state.goal - state.force
+        missing = np.where(np.abs(missing) < REACHED, 0.0, missing)
         increments = self._actions.increment_mm / scales.travel_mm
         moves = self.gain * self._step(slopes, missing, state, scales)
         return motor_actions(moves, state, increments)
