@@ -11,9 +11,9 @@ PI_GAINS = {  # action per EI/L² of change in the force error; action per EI/L�
     "CCR/SoftObstacle-v1": (1.08, 0.86),
     "CCR/InsertAndPush-v1": (0.7, 0.5),
     "CCR/SpatialPush-v1": (0.7, 0.5),
-    "CCR/LoadCell-Paper-v1": (0.35, 0.6),
-    "CCR/PushObstacle-Paper-v1": (0.92, 0.53),
-    "CCR/SpatialPush-Paper-v1": (0.7, 0.5),
+    "CCR/LoadCell-Paper-v1": (0.69, 5.5),
+    "CCR/PushObstacle-Paper-v1": (0.08, 1.92),
+    "CCR/SpatialPush-Paper-v1": (0.06, 2.7),
 }
 P_GAINS = {  # action per EI/L² of force error
     "CCR/LoadCell-v1": 0.47,
@@ -23,9 +23,9 @@ P_GAINS = {  # action per EI/L² of force error
     "CCR/SoftObstacle-v1": 0.59,
     "CCR/InsertAndPush-v1": 0.3,
     "CCR/SpatialPush-v1": 0.3,
-    "CCR/LoadCell-Paper-v1": 0.47,
-    "CCR/PushObstacle-Paper-v1": 0.28,
-    "CCR/SpatialPush-Paper-v1": 0.3,
+    "CCR/LoadCell-Paper-v1": 5.0,
+    "CCR/PushObstacle-Paper-v1": 1.53,
+    "CCR/SpatialPush-Paper-v1": 3.6,
 }
 NEWTON_GAIN = 0.8  # share of a Newton step
 

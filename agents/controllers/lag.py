@@ -17,8 +17,9 @@ ALL = slice(None)
 class LagEstimator:
     """Estimates where the cables of many robots are now, from motor positions and delayed observations of the shape.
 
-    All displacements are commands of the sections, in the offset a of the cables. Every pair of a latency and a backlash predicts, from the past of the motors, the displacements that are observed
-    now; the pair with the smallest sum of squared errors so far is used.
+    All displacements are commands of the sections, in the offset a of the cables. Every pair of a latency and a
+    backlash predicts, from the past of the motors, the displacements that are observed now; the pair with the smallest
+    sum of squared errors so far is used.
 
     Args:
         count: Number N of robots.

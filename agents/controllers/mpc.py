@@ -12,7 +12,7 @@ from agents.environment import Environment, require_env
 from agents.policy import Observation, search, set_points
 from agents.tuned import MPCSettings
 
-SMALLEST = 6e-4  # move that is worth crossing the backlash [a]
+SMALLEST = 0.006  # change of force that is worth crossing the backlash [EI/L²]
 
 
 @dataclass(slots=True)
@@ -50,30 +50,32 @@ class PredictiveController:
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then the first move of a plan."""
         direction, settings = search(observation), self._env.get_wrapper_attr("settings")
-        commands, travel = observation["cable"].size, settings.scales.travel_mm
-        along = direction[:commands] * settings.actuation.sections / float(direction @ direction)
+        sections, travel = settings.actuation.sections, settings.scales.travel_mm
+        along = direction[: observation["cable"].size] / float(direction @ direction)
         motor = float(observation["cable"] @ along) * settings.cable_limit_mm / travel
         observed = float(observed_commands(observation, settings.robot) @ along)
         self._lag.update(np.array([[motor]]), np.array([[observed]]))
         measured = self._tare.force(observation)
         if measured is None:
             return direction
-        self._readings.append((observed, float(np.linalg.norm(measured))))
-        goals = set_points(observation, self.settings.horizon)
-        increment = settings.actuation.sections * settings.max_increment_mm / travel
-        return np.asarray(self._action(motor, increment, goals) * direction, np.float32)
+        self._readings.append((sections * observed, float(np.linalg.norm(measured))))
+        increment = sections * settings.max_increment_mm / travel
+        move = self._move(sections * self._lag.cables.item(), increment, set_points(observation, self.settings.horizon))
+        if move == 0:
+            return np.zeros_like(direction)
+        play = self._lag.cables.item() + np.copysign(self._lag.half_backlash.item(), move) - motor
+        action = min(max((move + sections * play) / increment, -1.0), 1.0)
+        return np.asarray(action * direction, np.float32)
 
-    def _action(self, motor: float, increment: float, goals: np.ndarray) -> float:
-        """Return the share of a full increment [a] that makes the first move of a plan, backlash included."""
-        cable, half_backlash = self._lag.cables.item(), self._lag.half_backlash.item()
+    def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:
+        """Return the first move of a plan from a cable displacement [a], 0 where it adds too little force."""
         force, slope = self._curve(cable)
-        move = increment * self._plan(max(slope, self.settings.least_slope) * increment, force, goals)
-        if abs(move) < SMALLEST:
-            return 0.0
-        return float(min(max((cable + move + np.copysign(half_backlash, move) - motor) / increment, -1.0), 1.0))
+        slope = max(slope, self.settings.least_slope)
+        move = increment * self._plan(slope * increment, force, goals)
+        return 0.0 if abs(slope * move) < SMALLEST else move
 
     def _curve(self, cable: float) -> tuple[float, float]:
-        """Return force [EI/L²] and slope [EI/L² per a] at a cable displacement, from a weighted fit through the readings.
+        """Return force [EI/L²] and slope [EI/L² per a] at a displacement, from a weighted fit through the readings.
 
         The curve stiffens at an assumed rate κ: ``F + F' (exp(κ d) − 1) / κ`` at a distance d. The assumed slope enters
         the fit as one more reading.
@@ -101,7 +103,7 @@ class PredictiveController:
 def plan(horizon: int, effort: float) -> ca.Function:
     """Return the quadratic programme of a plan, in moves ``(horizon,)`` within [−1, 1].
 
-    Its parameters are the force that a full move adds, the present force and the set-points ``(horizon,)``, all in EI/L².
+    Its parameters are the force that a full move adds, the present force and the set-points ``(horizon,)`` [EI/L²].
     """
     moves, parameters = ca.SX.sym("moves", horizon), ca.SX.sym("parameters", 2 + horizon)
     gain, force, goals = parameters[0], parameters[1], parameters[2:]

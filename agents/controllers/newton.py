@@ -22,9 +22,9 @@ class NewtonController:
 
     It knows the model, the scene and the state of the robot, which policies do not see, but not the rigidity: that it
     estimates as the ratio of the sensor readings to the model's forces one latency earlier. The zero of the sensor
-    comes from the time before contact; latency and backlash come from the observed cables (:class:`LagEstimator`). The
-    oracle sees all of these, the true force and the next set-point: it is an upper bound, not a competitor. With several
-    actions the increments are the smallest that reach the set-point, or come closest to a set-point that is a vector.
+    comes from the time before contact; latency and backlash come from the observed shape (:class:`LagEstimator`). The
+    oracle sees all of these, the true force and the next set-point: it is an upper bound, not a competitor. Of several
+    actions it makes the smallest increments that reach the set-point, or come closest to a vector.
 
     Attributes:
         oracle: Whether it sees every hidden quantity.

@@ -58,9 +58,7 @@ def teacher_actions(envs: VecEnv, observation: Observation) -> np.ndarray:
     return np.where(force[:, None] > 0, actions, direction.astype(np.float32))
 
 
-def _slopes(
-    envs: VecEnv, actuated: np.ndarray, direction: np.ndarray, force: np.ndarray, scales: Scales
-) -> np.ndarray:
+def _slopes(envs: VecEnv, actuated: np.ndarray, direction: np.ndarray, force: np.ndarray, scales: Scales) -> np.ndarray:
     """Return the slopes of the regulated forces' magnitudes along a direction, ``(N,)`` [EI/L² per a].
 
     They are those of the contact forces, times the ratios of the regulated forces to them.
