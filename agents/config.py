@@ -44,7 +44,7 @@ class TrainConfig:
 
     run: Path = Path("runs/ppo")
     """Run folder: receives the actor, its configuration, the latest checkpoint and the TensorBoard log."""
-    env_id: str = "CCR/PushObstacle-v0"
+    env_id: str = "CCR/PushObstacle-v1"
     """Environment to train on."""
     sensing: Literal["ideal", "realistic"] = "realistic"
     """Sensors and motors: perfect, or with backlash, latency, noise and unknown rigidity."""
@@ -174,7 +174,7 @@ class SweepConfig:
 
     what: Literal["P", "PI", "MPC", "Newton", "PPO", "SAC", "RecurrentPPO", "Distilled"] = "PI"
     """Controller or learner to tune."""
-    env_id: str = "CCR/PushObstacle-v0"
+    env_id: str = "CCR/PushObstacle-v1"
     """Environment to tune it on."""
     trials: int = 50
     """Trials to add to the study."""

@@ -1,13 +1,17 @@
-"""The interface of a policy, and what controllers and teachers have in common."""
+"""The interface of a policy, and what controllers and teachers have in common.
+
+Controllers compute in the natural units of the robot (:class:`ccr_gym.Scales`): forces in EI/L², cable displacements in
+the offset a of the cables. So their gains suit robots of any size and rigidity.
+"""
 
 from typing import Protocol
 
 import numpy as np
 
 from agents.environment import Environment, Observation
-from ccr_gym import AHEAD, FORCE_SCALE_N, PrivilegedState
+from ccr_gym import AHEAD, FORCE_SPAN, PrivilegedState, Scales
 
-__all__ = ["Observation", "Policy", "motor_actions", "search", "set_points"]
+__all__ = ["Observation", "Policy", "motor_actions", "natural", "search", "set_points"]
 
 
 class Policy(Protocol):
@@ -19,44 +23,53 @@ class Policy(Protocol):
         """Start a new episode; a controller that uses more than its observations takes it from the environment."""
 
     def act(self, observation: Observation) -> np.ndarray:
-        """Return the action for an observation: ``(1,)``, or ``(2,)`` in space and with insertion, in [−1, 1]."""
+        """Return the action for an observation, ``(actions,)`` in [−1, 1]."""
 
 
 def search(observation: Observation) -> np.ndarray:
     """Return the full-speed action that bends the robot towards the obstacle, ``(..., actions)``.
 
-    In the plane there is only one direction. In space the two pairs of cables are assumed to be at right angles.
+    All sections bend alike, and an insertion stays where it is. In space the pairs of cables of the paper's model are
+    assumed to be at right angles.
 
     Args:
         observation: The observation of one robot, or of many.
     """
-    many = observation["desired_force"].shape[:-1]
+    many, commands = observation["desired_force"].shape[:-1], observation["cable"].shape[-1]
+    pull = np.ones((*many, commands), np.float32)
+    if "obstacle" in observation:
+        azimuth = np.arctan2(observation["obstacle"][..., 1], observation["obstacle"][..., 0])
+        towards = np.stack([np.cos(azimuth), np.sin(azimuth)] * (commands // 2), axis=-1)
+        pull = np.asarray(towards / np.abs(towards).max(axis=-1, keepdims=True), np.float32)
     if "length" in observation:
-        return np.broadcast_to(np.array([1.0, 0.0], np.float32), (*many, 2))
-    if "obstacle" not in observation:
-        return np.ones((*many, 1), np.float32)
-    azimuth = np.arctan2(observation["obstacle"][..., 1], observation["obstacle"][..., 0])
-    pull = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
-    return np.asarray(pull / np.abs(pull).max(axis=-1, keepdims=True), np.float32)
+        pull = np.concatenate([pull, np.zeros((*many, 1), np.float32)], axis=-1)
+    return pull
 
 
 def set_points(observation: Observation, steps: int) -> np.ndarray:
-    """Return the set-point magnitudes after each of the next steps, ``(steps,)`` [N].
+    """Return the set-point magnitudes after each of the next steps, ``(steps,)`` [EI/L²].
 
     They are interpolated between the previewed ones; without a preview the present set-point is held.
     """
     now = float(np.linalg.norm(observation["desired_force"]))
     ahead = observation.get("desired_ahead", np.full(len(AHEAD), now))
-    return np.asarray(FORCE_SCALE_N * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
+    return np.asarray(FORCE_SPAN * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
+
+
+def natural(state: PrivilegedState, scales: Scales) -> PrivilegedState:
+    """Return a state in the natural units of its robot: forces in EI/L², places in the cable travel a."""
+    force, travel = scales.force_n, scales.travel_mm
+    places = (state.actuated_mm / travel, state.motor_mm / travel, state.half_backlash_mm / travel)
+    return PrivilegedState(state.force / force, state.rigidity_ratio, state.goal / force, *places)
 
 
 def motor_actions(moves: np.ndarray, state: PrivilegedState, increments: np.ndarray) -> np.ndarray:
     """Return the actions ``(..., actions)`` that move the cables and the base as wanted, backlash included.
 
     Args:
-        moves: Wanted moves, ``(..., actions)`` [mm]; where one is zero the motor stays.
-        state: Actuated positions, motor positions and backlash.
-        increments: Moves of full actions, ``(actions,)`` [mm].
+        moves: Wanted moves, ``(..., actions)``; where one is zero the motor stays.
+        state: Actuated positions, motor positions and backlash, in the same unit.
+        increments: Moves of full actions, ``(actions,)``, in the same unit.
     """
     play = np.where(moves == 0, 0.0, state.actuated_mm + np.copysign(state.half_backlash_mm, moves) - state.motor_mm)
     wanted = (moves + play) / increments

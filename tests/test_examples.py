@@ -34,13 +34,12 @@ def test_in_ppo_the_last_observation_of_an_episode_follows_its_last_step():
     assert (experience.observation[:, 0] == 0).all()  # and slack in the next episode
 
 
-@pytest.mark.parametrize("env_id", ["CCR/LoadCell-v0", "CCR/PushObstacle-v0"])
+@pytest.mark.parametrize("env_id", ["CCR/LoadCell-v1", "CCR/PushObstacle-v1"])
 def test_the_settings_for_the_zoo_are_those_for_ideal_sensing(env_id):
     yaml = pytest.importorskip("yaml")
     by_id = yaml.safe_load((EXAMPLES / "rl_zoo_ppo.yml").read_text())
     assert by_id.keys() <= set(ENV_IDS)
     settings, config = by_id[env_id], PPO_IDEAL
-    assert settings.pop("env_wrapper") == "gymnasium.wrappers.FlattenObservation"
     assert settings.pop("normalize") is True
     assert (settings.pop("n_timesteps"), settings.pop("n_envs")) == (config.steps, config.envs)
     assert settings.pop("learning_rate") == f"lin_{config.learning_rate}"

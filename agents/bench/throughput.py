@@ -21,7 +21,7 @@ from agents.learning.sb3_adapter import SB3VecEnv
 from agents.learning.training import train
 from agents.tuned import PPO_IDEAL
 
-OURS, PEER = "CCR/PushObstacle-v0", "Pendulum-v1"
+OURS, PEER = "CCR/PushObstacle-v1", "Pendulum-v1"
 ROUNDS = 7  # the median counts
 
 

@@ -48,7 +48,7 @@ def _sensing(sensing: str) -> str:
     if sensing == "ideal":
         return sensing
     ranges = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in asdict(Sensing()).items())
-    return f"{ranges} (newton, millimetre, steps)"
+    return f"{ranges} (forces in EI/L², play in the offset a of the cables, latency in steps)"
 
 
 def _result(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:

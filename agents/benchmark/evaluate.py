@@ -21,10 +21,10 @@ class Episode:
 
     Attributes:
         goal: Magnitude of the set-point after every step, ``(k,)`` [N].
-        error_n: Distance of the true force from the set-point, of magnitudes or vectors, ``(k,)`` [N].
+        error_n: Distance of the regulated force from the set-point, of magnitudes or vectors, ``(k,)`` [N].
         estimate_error_n: Distance of the virtual-work estimate from the set-point, ``(k,)`` [N].
-        true: Magnitude of the true contact force, ``(k,)`` [N].
-        estimated: Magnitude of its virtual-work estimate, ``(k,)`` [N].
+        force: Magnitude of the regulated force: the true one, or the estimate if that is to be regulated, ``(k,)`` [N].
+        estimated: Magnitude of the virtual-work estimate, ``(k,)`` [N].
         cost: Force above the limit, ``(k,)`` [N].
         statuses: Solver status of every step.
         equilibria: Equilibrium after every step, if they were asked for.
@@ -34,7 +34,7 @@ class Episode:
     goal: np.ndarray
     error_n: np.ndarray
     estimate_error_n: np.ndarray
-    true: np.ndarray
+    force: np.ndarray
     estimated: np.ndarray
     cost: np.ndarray
     statuses: tuple[Status, ...]
@@ -81,16 +81,16 @@ METRICS = tuple(field.name for field in fields(Metrics))
 
 def measure(episode: Episode) -> Metrics:
     """Return the metrics of an episode."""
-    touching, outside = episode.true > 0, np.flatnonzero(episode.error > TOLERANCE)
+    touching, outside = episode.force > 0, np.flatnonzero(episode.error > TOLERANCE)
     return Metrics(
         rmse_mn=_rms_mn(episode.error_n[SEARCH:]),
         estimate_rmse_mn=_rms_mn(episode.estimate_error_n[SEARCH:]),
         steady_mn=1e3 * float(episode.error_n[-STEADY:].mean()),
         success=float(episode.error[-1] <= TOLERANCE),
         settling_step=float(outside[-1] + 2 if outside.size else 1),
-        overshoot=max(0.0, float((episode.true / episode.goal).max()) - 1),
+        overshoot=max(0.0, float((episode.force / episode.goal).max()) - 1),
         contact_losses=float((touching[:-1] & ~touching[1:]).sum()),
-        peak_mn=1e3 * float(episode.true.max()),
+        peak_mn=1e3 * float(episode.force.max()),
         violations=float((episode.cost > 0).sum()),
         cost_mn=1e3 * float(episode.cost.sum()),
     )
@@ -107,6 +107,7 @@ def run_episode(policy: Policy, env_id: str, seed: int, keep: bool = False, **kw
         **kwargs: Arguments of the environment, such as ``sensing`` and ``split``.
     """
     env = make_env(env_id, **kwargs)
+    regulated = {"true": "force_true", "estimate": "force_est"}[env.get_wrapper_attr("settings").regulate]
     observation, info = env.reset(seed=seed)
     policy.reset(env)
     rows: list[tuple[float, ...]] = []
@@ -116,23 +117,23 @@ def run_episode(policy: Policy, env_id: str, seed: int, keep: bool = False, **kw
         action = policy.act(observation)
         seconds += time.perf_counter() - start
         observation, _, _, truncated, info = env.step(action)
-        rows.append(_forces(info["desired_force"], info["force_true"], info["force_est"], info["cost"]))
+        rows.append(_forces(info["desired_force"], info[regulated], info["force_est"], info["cost"]))
         statuses.append(Status(info["solver_status"]))
         if keep:
             equilibria.append(env.get_wrapper_attr("equilibrium"))
     env.close()
-    goal, error, estimate_error, true, estimated, cost = np.array(rows, float).T
+    goal, error, estimate_error, force, estimated, cost = np.array(rows, float).T
     outcome = tuple(statuses), tuple(equilibria), seconds
-    return Episode(goal, error, estimate_error, true, estimated, cost, *outcome)
+    return Episode(goal, error, estimate_error, force, estimated, cost, *outcome)
 
 
-def _forces(goal: np.ndarray | float, true: np.ndarray, estimated: np.ndarray, cost: float) -> tuple[float, ...]:
+def _forces(goal: np.ndarray | float, force: np.ndarray, estimated: np.ndarray, cost: float) -> tuple[float, ...]:
     """Return the numbers of a step in the order of :class:`Episode`."""
-    size, estimate = float(np.linalg.norm(true)), float(np.linalg.norm(estimated))
+    size, estimate = float(np.linalg.norm(force)), float(np.linalg.norm(estimated))
     if np.ndim(goal) == 0:
         errors = abs(size - float(goal)), abs(estimate - float(goal))
     else:
-        errors = float(np.linalg.norm(true - goal)), float(np.linalg.norm(estimated - goal))
+        errors = float(np.linalg.norm(force - goal)), float(np.linalg.norm(estimated - goal))
     return float(np.linalg.norm(goal)), *errors, size, estimate, cost
 
 

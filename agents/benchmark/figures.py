@@ -18,7 +18,7 @@ from agents.files import JsonObject, replacing
 from agents.learning.actor import LearningCurve
 from solver.spatial import SpatialEquilibrium
 
-TRUE, ESTIMATE, GOAL = "C0", "C1", "0.3"
+FORCE, ESTIMATE, GOAL = "C0", "C1", "0.3"
 COLUMNS = 4
 
 
@@ -44,7 +44,7 @@ def draw_episodes(episodes: dict[str, tuple[Episode, ...]], path: Path) -> None:
 def _draw_instant(figure: Figure, axis: Axes, name: str, episode: Episode, step: int) -> None:
     """Draw the shape after a step of an episode, on axes in space where the robot is."""
     equilibrium = episode.equilibria[step]
-    title = f"{name}, step {step + 1}: {1e3 * episode.true[step]:.0f} of {1e3 * episode.goal[step]:.0f} mN"
+    title = f"{name}, step {step + 1}: {1e3 * episode.force[step]:.0f} of {1e3 * episode.goal[step]:.0f} mN"
     if isinstance(equilibrium, SpatialEquilibrium):
         spec = axis.get_subplotspec()
         axis.remove()
@@ -122,19 +122,19 @@ def _color(policy: str) -> str:
 
 def instants(episode: Episode) -> list[int]:
     """Return four characteristic steps: on the way, first contact, half of the set-point, and the end."""
-    touch = int(np.argmax(episode.true > 0))
-    half = int(np.argmax(episode.true > episode.goal / 2))
-    return [touch // 2, touch, half, len(episode.true) - 1]
+    touch = int(np.argmax(episode.force > 0))
+    half = int(np.argmax(episode.force > episode.goal / 2))
+    return [touch // 2, touch, half, len(episode.force) - 1]
 
 
 def draw_force(axis: Axes, episode: Episode) -> None:
-    """Draw true and estimated force over the steps of an episode."""
-    steps = np.arange(1, len(episode.true) + 1)
+    """Draw regulated and estimated force over the steps of an episode."""
+    steps = np.arange(1, len(episode.force) + 1)
     goal = 1e3 * episode.goal
     axis.fill_between(steps, 0.95 * goal, 1.05 * goal, color=GOAL, alpha=0.15, lw=0)
     axis.plot(steps, goal, color=GOAL, ls="--", lw=1, label="set-point ± 5 %")
     axis.plot(steps, 1e3 * episode.estimated, color=ESTIMATE, lw=1, ls="--", alpha=0.7, label="virtual-work estimate")
-    axis.plot(steps, 1e3 * episode.true, color=TRUE, lw=2, label="true")
+    axis.plot(steps, 1e3 * episode.force, color=FORCE, lw=2, label="regulated force")
     axis.set_ylim(0, 1.1e3 * min(max(episode.estimated.max(), 1.3 * episode.goal.max()), 4 * episode.goal.max()))
     axis.set_xlabel("step")
     axis.grid(alpha=0.3)

@@ -19,7 +19,7 @@ from agents.files import JsonObject
 from agents.learning.actor import LearnedPolicy, TrainingRecord
 from agents.learning.pretrained import SUFFIX, folder_name, trained
 from agents.policy import Policy
-from agents.tuned import LEARNERS
+from agents.tuned import LEARNERS, sensing_of
 from agents.workers import worker_pool
 from solver import Status
 
@@ -27,7 +27,7 @@ SHOWN = 4  # first episodes, which figures show
 CONTROLLERS: dict[str, Callable[[str], Policy]] = {  # made for an environment
     "P": ForceController.proportional_only,
     "PI": ForceController.tuned,
-    "MPC": PredictiveController.tuned,
+    "MPC": lambda _: PredictiveController(),
     "Newton": lambda _: NewtonController(),
     "Oracle": lambda _: NewtonController.knowing(),
 }
@@ -132,7 +132,7 @@ def _entries_of_runs(config: EvaluateConfig) -> list[Entry]:
 
 def _entries_of_package(config: EvaluateConfig) -> list[Entry]:
     found = [
-        Entry(policy, env_id, "realistic", files)
+        Entry(policy, env_id, sensing_of(env_id), files)
         for env_id in config.env_ids
         for policy in config.policies
         for files in [trained(policy, env_id, config.pretrained)]
@@ -178,7 +178,7 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
             episode = run_episode(policy, entry.env_id, seed + i, keep, **kwargs)
             rows.append(tuple(asdict(measure(episode)).values()))
             statuses.update(status.name for status in episode.statuses)
-            steps, seconds = steps + len(episode.true), seconds + episode.seconds
+            steps, seconds = steps + len(episode.force), seconds + episode.seconds
             if keep:
                 shown.append(episode)
     if video is not None:

@@ -24,6 +24,7 @@ from agents.tuned import (
     PPOSettings,
     RecurrentPPOSettings,
     SACSettings,
+    sensing_of,
 )
 
 
@@ -48,9 +49,8 @@ def sweep(config: SweepConfig) -> optuna.Study:
 
 def _score(trial: optuna.Trial, config: SweepConfig) -> float:
     """Return the interquartile mean of the force error on training scenes [mN]."""
-    errors = scores(
-        _policy(trial, config), config.env_id, VALIDATION_SEED, config.episodes, sensing="realistic", split="train"
-    )
+    kwargs = {"sensing": sensing_of(config.env_id), "split": "train"}
+    errors = scores(_policy(trial, config), config.env_id, VALIDATION_SEED, config.episodes, **kwargs)
     return float(iqm(errors))
 
 
@@ -61,18 +61,18 @@ def _policy(trial: optuna.Trial, config: SweepConfig) -> Policy:
         return PredictiveController(_mpc(trial))
     if config.what == "Newton":
         return NewtonController(gain=trial.suggest_float("gain", 0.2, 1.0))
-    proportional = trial.suggest_float("proportional", 0.0, 100.0) if config.what == "PI" else 0.0
-    return ForceController(proportional, trial.suggest_float("integral", 1.0, 100.0, log=True))
+    proportional = trial.suggest_float("proportional", 0.0, 4.0) if config.what == "PI" else 0.0
+    return ForceController(proportional, trial.suggest_float("integral", 0.05, 4.0, log=True))
 
 
 def _mpc(trial: optuna.Trial) -> MPCSettings:
     return MPCSettings(
         effort=trial.suggest_float("effort", 0.001, 10.0, log=True),
-        slope=trial.suggest_float("slope", 0.001, 1.0, log=True),
-        least_slope=trial.suggest_float("least_slope", 0.001, 0.3, log=True),
-        trust=trial.suggest_float("trust", 1e-4, 1.0, log=True),
-        stiffening=trial.suggest_float("stiffening", 0.01, 1.0, log=True),
-        width_mm=trial.suggest_float("width_mm", 0.02, 2.0, log=True),
+        slope=trial.suggest_float("slope", 0.1, 40.0, log=True),
+        least_slope=trial.suggest_float("least_slope", 0.1, 10.0, log=True),
+        trust=trial.suggest_float("trust", 1e-6, 0.01, log=True),
+        stiffening=trial.suggest_float("stiffening", 0.1, 10.0, log=True),
+        width=trial.suggest_float("width", 0.005, 0.25, log=True),
     )
 
 
@@ -80,7 +80,8 @@ def _learned(trial: optuna.Trial, config: SweepConfig) -> Policy:
     """Return a policy that was trained with the settings of a trial."""
     settings = _settings(trial, replace(LEARNERS[config.what](), steps=config.steps))
     run = config.out / f"{config.what}-{folder_name(config.env_id)}-{trial.number}"
-    return LearnedPolicy(training.train(TrainConfig(run=run, env_id=config.env_id, learner=settings), progress=False))
+    trained = TrainConfig(run=run, env_id=config.env_id, sensing=sensing_of(config.env_id), learner=settings)
+    return LearnedPolicy(training.train(trained, progress=False))
 
 
 def _settings(trial: optuna.Trial, base: LearnerSettings) -> LearnerSettings:

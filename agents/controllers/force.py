@@ -8,7 +8,7 @@ from agents.controllers.tare import Tare
 from agents.environment import Environment
 from agents.policy import Observation, search
 from agents.tuned import P_GAINS, PI_GAINS
-from ccr_gym import FORCE_SCALE_N
+from ccr_gym import FORCE_SPAN
 
 
 @dataclass(slots=True)
@@ -16,17 +16,17 @@ class ForceController:
     """Proportional-integral control of the contact force's magnitude, after a search for contact at full speed.
 
     The mean sensor reading before contact is subtracted. The action is the change of the controller's output (velocity
-    form), so the integral does not wind up at saturation. In space both cables move in the direction of the search; an
-    insertion stays where it is.
+    form), so the integral does not wind up at saturation. All cables move in the direction of the search; an insertion
+    stays where it is.
 
     Attributes:
-        proportional: Action per newton of change in the force error.
-        integral: Action per newton of force error.
+        proportional: Action per EI/L² of change in the force error.
+        integral: Action per EI/L² of force error.
         name: Name of the policy.
     """
 
-    proportional: float = 5.0
-    integral: float = 20.0
+    proportional: float = 0.3
+    integral: float = 0.5
     name: str = "PI"
     _last: float | None = field(default=None, init=False)
     _tare: Tare = field(default_factory=Tare, init=False)
@@ -52,7 +52,7 @@ class ForceController:
         if force is None:
             self._last = None
             return search(observation)
-        error = FORCE_SCALE_N * float(np.linalg.norm(observation["desired_force"])) - float(np.linalg.norm(force))
+        error = FORCE_SPAN * float(np.linalg.norm(observation["desired_force"])) - float(np.linalg.norm(force))
         change = 0.0 if self._last is None else error - self._last
         self._last = error
         effort = min(max(self.proportional * change + self.integral * error, -1.0), 1.0)

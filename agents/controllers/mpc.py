@@ -6,13 +6,13 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from agents.controllers.lag import LagEstimator, observed_cables
+from agents.controllers.lag import LagEstimator, observed_commands
 from agents.controllers.tare import Tare
 from agents.environment import Environment, require_env
 from agents.policy import Observation, search, set_points
-from agents.tuned import MPC, MPCSettings
+from agents.tuned import MPCSettings
 
-SMALLEST_MM = 0.005  # smaller moves are not worth crossing the backlash
+SMALLEST = 0.006  # change of force that is worth crossing the backlash [EI/L²]
 
 
 @dataclass(slots=True)
@@ -22,8 +22,8 @@ class PredictiveController:
     Every step solves a quadratic programme (CasADi) and makes its first move. The controller estimates what it needs
     from its observations and the known geometry of the robot: latency and backlash, and from them the present
     displacement of the cable (:class:`LagEstimator`); force and slope there, from a curve through the readings so far
-    that weights nearby readings most; and the zero of the force sensor, from the time before contact. In space both
-    cables move in the direction of the search; an insertion stays where it is.
+    that weights nearby readings most; and the zero of the force sensor, from the time before contact. All cables move
+    in the direction of the search, and displacements are summed over the sections; an insertion stays where it is.
 
     Attributes:
         settings: Assumptions, and weights of the plan.
@@ -36,11 +36,6 @@ class PredictiveController:
     _lag: LagEstimator = field(default_factory=lambda: LagEstimator(1, 1), init=False)
     _tare: Tare = field(default_factory=Tare, init=False)
     _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
-
-    @classmethod
-    def tuned(cls, env_id: str) -> "PredictiveController":
-        """Return the controller with the settings that were best on training scenes with realistic sensing."""
-        return cls(MPC[env_id])
 
     def reset(self, env: Environment | None = None) -> None:
         """Forget the episode and take the robot and the range of its motors from the environment.
@@ -55,36 +50,39 @@ class PredictiveController:
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then the first move of a plan."""
         direction, settings = search(observation), self._env.get_wrapper_attr("settings")
+        sections, travel = settings.actuation.sections, settings.scales.travel_mm
         along = direction[: observation["cable"].size] / float(direction @ direction)
-        motor = float(observation["cable"] @ along) * settings.cable_limit_mm
-        observed = float(observed_cables(observation, settings.robot) @ along)
+        motor = float(observation["cable"] @ along) * settings.cable_limit_mm / travel
+        observed = float(observed_commands(observation, settings.robot) @ along)
         self._lag.update(np.array([[motor]]), np.array([[observed]]))
         measured = self._tare.force(observation)
         if measured is None:
             return direction
-        self._readings.append((observed, float(np.linalg.norm(measured))))
-        goals = set_points(observation, self.settings.horizon)
-        action = self._action(motor, settings.max_increment_mm, goals)
+        self._readings.append((sections * observed, float(np.linalg.norm(measured))))
+        increment = sections * settings.max_increment_mm / travel
+        move = self._move(sections * self._lag.cables.item(), increment, set_points(observation, self.settings.horizon))
+        if move == 0:
+            return np.zeros_like(direction)
+        play = self._lag.cables.item() + np.copysign(self._lag.half_backlash.item(), move) - motor
+        action = min(max((move + sections * play) / increment, -1.0), 1.0)
         return np.asarray(action * direction, np.float32)
 
-    def _action(self, motor: float, increment: float, goals: np.ndarray) -> float:
-        """Return the share of a full increment [mm] that makes the first move of a plan, backlash included."""
-        cable, half_backlash = self._lag.cables.item(), self._lag.half_backlash.item()
+    def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:
+        """Return the first move of a plan from a cable displacement [a], 0 where it adds too little force."""
         force, slope = self._curve(cable)
-        move = increment * self._plan(max(slope, self.settings.least_slope) * increment, force, goals)
-        if abs(move) < SMALLEST_MM:
-            return 0.0
-        return float(min(max((cable + move + np.copysign(half_backlash, move) - motor) / increment, -1.0), 1.0))
+        slope = max(slope, self.settings.least_slope)
+        move = increment * self._plan(slope * increment, force, goals)
+        return 0.0 if abs(slope * move) < SMALLEST else move
 
     def _curve(self, cable: float) -> tuple[float, float]:
-        """Return force [N] and slope [N/mm] at a cable displacement, from a weighted fit through the readings.
+        """Return force [EI/L²] and slope [EI/L² per a] at a displacement, from a weighted fit through the readings.
 
         The curve stiffens at an assumed rate κ: ``F + F' (exp(κ d) − 1) / κ`` at a distance d. The assumed slope enters
         the fit as one more reading.
         """
         cables, forces = np.array(self._readings).T
         away, rate, trust = cables - cable, self.settings.stiffening, self.settings.trust
-        width = self.settings.width_mm + np.abs(away).min()
+        width = self.settings.width + np.abs(away).min()
         weights = np.exp(-0.5 * (away / width) ** 2)
         shape = np.expm1(rate * away) / rate
         cross = weights @ shape
@@ -105,11 +103,11 @@ class PredictiveController:
 def plan(horizon: int, effort: float) -> ca.Function:
     """Return the quadratic programme of a plan, in moves ``(horizon,)`` within [−1, 1].
 
-    Its parameters are the force that a full move adds [N], the present force [N] and the set-points ``(horizon,)`` [N].
+    Its parameters are the force that a full move adds, the present force and the set-points ``(horizon,)`` [EI/L²].
     """
     moves, parameters = ca.SX.sym("moves", horizon), ca.SX.sym("parameters", 2 + horizon)
     gain, force, goals = parameters[0], parameters[1], parameters[2:]
     errors = goals - force - gain * ca.cumsum(moves)
     cost = ca.sumsqr(errors) + effort * gain**2 * ca.sumsqr(moves)
     options = {"print_iter": False, "print_header": False, "print_info": False, "print_time": False}
-    return ca.qpsol("plan", "qrqp", {"x": moves, "p": parameters, "f": 1e4 * cost}, options)
+    return ca.qpsol("plan", "qrqp", {"x": moves, "p": parameters, "f": 100 * cost}, options)

@@ -4,39 +4,38 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.controllers.lag import LagEstimator, observed_cables
+from agents.controllers.lag import LagEstimator, observed_commands
 from agents.controllers.tare import Tare
 from agents.environment import Environment, require_env
-from agents.policy import Observation, motor_actions, search, set_points
+from agents.policy import Observation, motor_actions, natural, search, set_points
 from agents.tuned import NEWTON_GAIN
-from ccr_gym import FORCE_SCALE_N, ActionSpec, PrivilegedState
-from solver import Equilibrium, sensitivity
-from solver.spatial import SpatialSensitivity, spatial_sensitivity
+from ccr_gym import FORCE_SPAN, ActionSpec, PrivilegedState, Scales
 
-PROBE_MM = 1e-3  # trial move of a finite difference
-PRIOR = np.full(2, 1e-6)  # a reading of 1 mN that agrees with the model [N²]
+PROBE = 1e-4  # trial move of a finite difference [a]
+REACHED = 1e-9  # force error that is roundoff, for which no motor crosses its backlash [EI/L²]
+PRIOR = np.full(2, 4e-5)  # a reading at the resolution of a sensor that agrees with the model [(EI/L²)²]
 
 
 @dataclass(slots=True)
 class NewtonController:
-    """Newton steps on the exact slopes of the contact force in the actuated displacements, at the present equilibrium.
+    """Newton steps on the slopes of the contact force in the actuated displacements, from trial moves that are solved.
 
     It knows the model, the scene and the state of the robot, which policies do not see, but not the rigidity: that it
     estimates as the ratio of the sensor readings to the model's forces one latency earlier. The zero of the sensor
-    comes from the time before contact; latency and backlash come from the observed cables (:class:`LagEstimator`). The
-    oracle sees all of these, the true force and the next set-point: it is an upper bound, not a competitor. With two
-    actions the increments are the smallest that reach the set-point, or come closest to a set-point that is a vector.
+    comes from the time before contact; latency and backlash come from the observed shape (:class:`LagEstimator`). The
+    oracle sees all of these, the true force and the next set-point: it is an upper bound, not a competitor. Of several
+    actions it makes the smallest increments that reach the set-point, or come closest to a vector.
 
     Attributes:
         oracle: Whether it sees every hidden quantity.
         gain: Share of a Newton step that is made.
-        damping: Slope of the force below which it is not trusted [N/mm].
+        damping: Slope of the force below which it is not trusted [EI/L² per a].
         name: Name of the policy.
     """
 
     oracle: bool = False
     gain: float = NEWTON_GAIN
-    damping: float = 1e-4
+    damping: float = 0.005
     name: str = "Newton"
     _env: Environment = field(init=False)
     _actions: ActionSpec = field(init=False)
@@ -58,34 +57,39 @@ class NewtonController:
         """
         self._env, self._fit = require_env(env), PRIOR.copy()
         self._actions = self._env.get_wrapper_attr("action_spec")
-        self._lag = LagEstimator(1, self._actions.cables)
+        self._lag = LagEstimator(1, self._actions.commands)
         self._tare.reset()
         self._modelled.clear()
 
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then a step to the force of the set-point."""
-        state: PrivilegedState = self._env.get_wrapper_attr("privileged_state")
+        scales = self._env.get_wrapper_attr("settings").scales
+        known = state = natural(self._env.get_wrapper_attr("privileged_state"), scales)
         if not self.oracle:
-            state = self._estimated(observation, state)
+            state = self._estimated(observation, known)
         if not state.force.any():
             return search(observation)
-        slopes = self._tried(state) if self.oracle else self._slopes(state, "length" in observation)
+        slopes = self._slopes(known.actuated_mm, scales, float(np.linalg.norm(state.force)))
         if np.ndim(state.goal) == 0:  # a magnitude: only the component along the present force counts
             size = float(np.linalg.norm(state.force))
             slopes, missing = slopes @ (state.force / size)[:, None], np.array([state.goal - size])
         else:
             missing = state.goal - state.force
-        return motor_actions(self.gain * self._step(slopes, missing, state), state, self._actions.increment_mm)
+        missing = np.where(np.abs(missing) < REACHED, 0.0, missing)
+        increments = self._actions.increment_mm / scales.travel_mm
+        moves = self.gain * self._step(slopes, missing, state, scales)
+        return motor_actions(moves, state, increments)
 
-    def _step(self, slopes: np.ndarray, missing: np.ndarray, state: PrivilegedState) -> np.ndarray:
-        """Return the damped least-squares increments, ``(actions,)`` [mm], that add the missing force.
+    def _step(self, slopes: np.ndarray, missing: np.ndarray, state: PrivilegedState, scales: Scales) -> np.ndarray:
+        """Return the damped least-squares increments, ``(actions,)`` [a], that add the missing force.
 
         A motor at the end of its range is taken out, and the remaining ones make up for it.
         """
         free, damping = np.ones(len(slopes), bool), (state.rigidity_ratio * self.damping) ** 2
+        low, high = self._actions.low_mm / scales.travel_mm, self._actions.high_mm / scales.travel_mm
         for _ in free:
             increments = np.linalg.solve(slopes @ slopes.T + damping * np.eye(len(slopes)), slopes @ missing)
-            above, below = state.motor_mm > self._actions.low_mm, state.motor_mm < self._actions.high_mm
+            above, below = state.motor_mm > low, state.motor_mm < high
             free &= np.where(increments > 0, below, above)
             slopes = slopes * free[:, None]
         return np.asarray(increments)
@@ -93,9 +97,9 @@ class NewtonController:
     def _estimated(self, observation: Observation, state: PrivilegedState) -> PrivilegedState:
         """Return the state with every hidden quantity replaced by its estimate."""
         force, cables = state.force / state.rigidity_ratio, observation["cable"].size  # the force of the nominal model
-        vector = FORCE_SCALE_N * observation["desired_force"].astype(float)
+        vector = FORCE_SPAN * observation["desired_force"].astype(float)
         goal = vector if vector.size > 1 else set_points(observation, 1).item()
-        observed = observed_cables(observation, self._env.get_wrapper_attr("settings").robot)
+        observed = observed_commands(observation, self._env.get_wrapper_attr("settings").robot)
         self._lag.update(state.motor_mm[None, :cables], observed[None])
         self._modelled.append(float(np.linalg.norm(force)))
         measured = self._tare.force(observation)
@@ -108,19 +112,14 @@ class NewtonController:
         )  # an insertion has none
         return PrivilegedState(ratio * force, ratio, goal, state.actuated_mm, state.motor_mm, slack)
 
-    def _slopes(self, state: PrivilegedState, insertion: bool) -> np.ndarray:
-        """Return the slopes of the regulated force in the actuated displacements, ``(actions, d)`` [N/mm]."""
-        equilibrium, target = self._env.get_wrapper_attr("equilibrium"), self._env.get_wrapper_attr("task").target
-        counted = slice(None) if target is None else slice(target, target + 1)
-        if isinstance(equilibrium, Equilibrium):
-            actuated = len(equilibrium.robot.cables) + insertion  # the length follows the cables
-            slopes = sensitivity(equilibrium).forces[:actuated]
-        else:
-            slopes = spatial_sensitivity(equilibrium).forces[SpatialSensitivity.rows(equilibrium.robot).cables]
-        return np.asarray(state.rigidity_ratio * slopes[:, counted].sum(axis=1))
+    def _slopes(self, actuated: np.ndarray, scales: Scales, size: float) -> np.ndarray:
+        """Return the slopes of the regulated force in the actuated displacements, ``(actions, d)`` [EI/L² per a].
 
-    def _tried(self, state: PrivilegedState) -> np.ndarray:
-        """Return the slopes of the true force from trial moves that are solved exactly, which is faster."""
+        They are those of the contact force, times the ratio of the regulated force's magnitude to it.
+        """
         probe = self._env.get_wrapper_attr("probe")
-        trials = state.actuated_mm + PROBE_MM * np.eye(state.actuated_mm.size)
-        return np.array([(probe(places) - state.force) / PROBE_MM for places in trials])
+        high = self._actions.high_mm / scales.travel_mm
+        steps = np.where(actuated + PROBE > high, -PROBE, PROBE)
+        here = probe(actuated * scales.travel_mm)
+        there = np.array([probe(places * scales.travel_mm) for places in actuated + np.diag(steps)])
+        return np.asarray((there - here) / steps[:, None] * (size / float(np.linalg.norm(here))))

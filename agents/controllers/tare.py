@@ -3,7 +3,7 @@
 import numpy as np
 
 from agents.policy import Observation
-from ccr_gym import FORCE_SCALE_N
+from ccr_gym import FORCE_SPAN
 
 
 class Tare:
@@ -17,8 +17,8 @@ class Tare:
         self._readings.clear()
 
     def force(self, observation: Observation) -> np.ndarray | None:
-        """Return the measured force without the zero, ``(d,)`` [N], or ``None`` while nothing is seen to touch."""
-        measured = FORCE_SCALE_N * observation["force_measured"].astype(float)
+        """Return the measured force without the zero, ``(d,)`` [EI/L²], or ``None`` while nothing is seen to touch."""
+        measured = FORCE_SPAN * observation["force_measured"].astype(float)
         if not observation["contact"].any():
             self._readings.append(measured)
             return None

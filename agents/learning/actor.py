@@ -176,5 +176,4 @@ def _training(values: JsonObject) -> TrainingRecord:
 
 
 def _memory(env: Environment, space: spaces.Dict) -> Memory:
-    settings = env.get_wrapper_attr("settings")
-    return Memory(space, 1, settings.robot, settings.cable_limit_mm)
+    return Memory(space, 1, env.get_wrapper_attr("settings"))

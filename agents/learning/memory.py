@@ -13,17 +13,15 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from agents.controllers.lag import ALL, LagEstimator, observed_cables
+from agents.controllers.lag import ALL, LagEstimator, observed_commands
 from agents.environment import EnvIndex
-from ccr_gym import FORCE_SCALE_N
-from solver import Robot
-from solver.spatial import SpatialRobot
+from ccr_gym import FORCE_SPAN, Settings, SpatialSettings
 
 DECAYS = (0.0, 0.5, 0.8, 0.95)  # of the averages of past errors, per step
 TINY = 1e-9
 RATIO_DECAY = 0.97  # per step, of the readings that the ratio of sensor and estimate is fitted to
 MOVES = 6  # remembered moves of the motors
-FINE_N = 0.002  # force error that the logarithmic scale resolves
+FINE = 0.01  # force error that the logarithmic scale resolves [EI/L²]
 MOVE_SCALE = 28.0  # full increments in the range of a cable
 MOVED = ("cable", "length")
 
@@ -34,14 +32,13 @@ class Memory:
     Args:
         space: Space of a single observation, a dictionary.
         count: Number N of episodes.
-        robot: Robot of the environments.
-        cable_limit_mm: Largest cable displacement of the environments [mm].
+        settings: Settings of the environments.
 
     Attributes:
         size: Size of a row: an observation and its memory.
     """
 
-    def __init__(self, space: spaces.Dict, count: int, robot: Robot | SpatialRobot, cable_limit_mm: float) -> None:
+    def __init__(self, space: spaces.Dict, count: int, settings: Settings | SpatialSettings) -> None:
         sizes = {key: box.shape[0] for key, box in space.items() if box.shape}
         self._moved = [key for key in MOVED if key in sizes]
         moved, goal = sum(sizes[key] for key in self._moved), sizes["desired_force"]
@@ -51,7 +48,7 @@ class Memory:
         self._errors = np.zeros((count, len(DECAYS), 2 * goal))
         self._moves = np.zeros((count, MOVES, moved))
         self._motors = np.full((count, moved), np.nan)
-        self._robot, self._cable_limit_mm = robot, cable_limit_mm
+        self._robot, self._range = settings.robot, settings.cable_limit_mm / settings.scales.travel_mm
         self._lag = LagEstimator(count, sizes["cable"])
         remembered = (
             sizes["force_measured"] + 1 + goal + len(DECAYS) * 2 * goal + MOVES * moved + 2 + 2 * sizes["cable"]
@@ -98,8 +95,8 @@ class Memory:
 
     def _averaged(self, missing: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Return decaying averages of the force errors on a logarithmic scale, ``(k, decays, ...)``."""
-        missing = FORCE_SCALE_N * missing
-        missing = np.copysign(np.log1p(np.abs(missing) / FINE_N), missing)
+        missing = FORCE_SPAN * missing
+        missing = np.copysign(np.log1p(np.abs(missing) / FINE), missing)
         errors = self._errors[index]
         errors = errors + (1 - np.array(DECAYS)[:, None]) * (missing[:, None] - errors)
         self._errors[index] = errors
@@ -115,8 +112,8 @@ class Memory:
 
     def _update_lag(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> tuple[np.ndarray, ...]:
         """Return latency, half backlash, and the present cables relative to the observed ones and to the motors."""
-        motors, lag = self._cable_limit_mm * observation["cable"].astype(float), self._lag
-        lag.update(motors, observed_cables(observation, self._robot), index)
+        motors, lag = self._range * observation["cable"].astype(float), self._lag
+        lag.update(motors, observed_commands(observation, self._robot), index)
         cables, observed = lag.cables[index], lag.observed[index]
         return lag.latency[index][:, None], lag.half_backlash[index][:, None], cables - observed, cables - motors
 
@@ -141,7 +138,7 @@ class MemoryVecEnv(VecEnvWrapper):
     def __init__(self, venv: VecEnv) -> None:
         assert isinstance(venv.observation_space, spaces.Dict)
         settings = venv.get_attr("settings", [0])[0]
-        self._memory = Memory(venv.observation_space, venv.num_envs, settings.robot, settings.cable_limit_mm)
+        self._memory = Memory(venv.observation_space, venv.num_envs, settings)
         super().__init__(venv, spaces.Box(-np.inf, np.inf, (self._memory.size,), np.float32))
 
     def reset(self) -> np.ndarray:

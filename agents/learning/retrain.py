@@ -11,7 +11,7 @@ from agents.files import replacing
 from agents.learning.actor import ACTOR
 from agents.learning.pretrained import SUFFIX, folder_name
 from agents.learning.training import is_finished, train
-from agents.tuned import LEARNERS
+from agents.tuned import learner_settings, sensing_of
 from agents.workers import worker_pool
 
 
@@ -21,6 +21,7 @@ def runs(config: RetrainConfig) -> list[TrainConfig]:
         TrainConfig(
             run=config.out / learner / folder_name(env_id) / str(seed),
             env_id=env_id,
+            sensing=sensing_of(env_id),
             seed=1000 * seed,
             threads=1,
             learner=replace(settings, steps=max(1, round(config.share * settings.steps))),
@@ -28,7 +29,7 @@ def runs(config: RetrainConfig) -> list[TrainConfig]:
         for seed in range(config.seeds)
         for learner in config.learners
         for env_id in config.env_ids
-        for settings in [LEARNERS[learner]()]
+        for settings in [learner_settings(learner, sensing_of(env_id))]
     ]
 
 

@@ -96,7 +96,7 @@ def test_a_folder_that_cannot_be_written_is_named(arguments, monkeypatch, capsys
 
 
 def test_a_damaged_study_is_named(tmp_path, monkeypatch, capsys):
-    study = tmp_path / "PI-PushObstacle-v0.db"
+    study = tmp_path / "PI-PushObstacle-v1.db"
     study.write_bytes(b"no data base" * 100)
     assert_one_line(*called(monkeypatch, capsys, "sweep", "--out", tmp_path, "--trials", 1), str(study))
 
@@ -172,7 +172,7 @@ def test_a_log_that_cannot_be_written_is_named(tmp_path):
 
 
 def test_evaluating_on_a_full_disk_leaves_nothing_half_written(tmp_path):
-    arguments = ["--env-ids", "CCR/LoadCell-v0", "--policies", "PI", "P", "--episodes", 8, "--no-video", "--jobs", 1]
+    arguments = ["--env-ids", "CCR/LoadCell-v1", "--policies", "PI", "P", "--episodes", 8, "--no-video", "--jobs", 1]
     out = tmp_path / "out"
     code, lines = ended(started("evaluate", "--out", out, *arguments, preexec_fn=limited(500)))
     assert_one_line(code, lines[-1:], f"{out / 'evaluation.json'} cannot be written: File too large")

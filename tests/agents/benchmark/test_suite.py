@@ -63,7 +63,7 @@ def test_evaluate_writes_table_figures_and_videos(run, tmp_path, monkeypatch, ca
     arguments = ["evaluate", "--runs", str(run), "--out", str(tmp_path), "--episodes", "3", "--jobs", "1"]
     monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments, "--policies", "PI", "Oracle", "PPO"])
     cli.main()
-    assert "CCR/PushObstacle-v0, realistic sensing" in capsys.readouterr().out
+    assert "CCR/PushObstacle-v1, realistic sensing" in capsys.readouterr().out
     written = json.loads((tmp_path / "evaluation.json").read_text())
     assert [result["policy"] for result in written["results"]] == ["PPO", "PI", "Oracle"]
     for result in written["results"]:
@@ -71,14 +71,14 @@ def test_evaluate_writes_table_figures_and_videos(run, tmp_path, monkeypatch, ca
         low, high = result["summary"]["rmse_interval_mn"]
         assert low <= result["summary"]["rmse_iqm_mn"] <= high
         assert sum(result["summary"]["statuses"].values()) == 3 * 64
-    for name in ("PushObstacle-v0.png", "scores.png", "profiles.png", "curves.png"):
+    for name in ("PushObstacle-v1.png", "scores.png", "profiles.png", "curves.png"):
         assert (tmp_path / name).stat().st_size > 10_000
     assert len(list((tmp_path / "videos").glob("*.mp4"))) == 3
     assert "| PPO |" in (tmp_path / "evaluation.md").read_text()
 
 
 def test_every_policy_plays_the_same_scenes():
-    first, second = (play(Entry(name, "CCR/LoadCell-v0", "realistic"), 1_000_000, 2) for name in ("P", "PI"))
+    first, second = (play(Entry(name, "CCR/LoadCell-v1", "realistic"), 1_000_000, 2) for name in ("P", "PI"))
     for a, b in zip(first.shown, second.shown, strict=True):
         assert np.array_equal(a.goal, b.goal)
         assert a.equilibria[0].scene == b.equilibria[0].scene
@@ -87,7 +87,7 @@ def test_every_policy_plays_the_same_scenes():
 def test_the_share_that_is_closed_and_whether_intervals_are_apart():
     def result(name, errors):
         metrics = {metric: np.ones((1, 20)) for metric in METRICS} | {"rmse_mn": np.array([errors], float)}
-        return suite.Result(Entry(name, "CCR/LoadCell-v0", "realistic"), metrics, suite.summarize(metrics))
+        return suite.Result(Entry(name, "CCR/LoadCell-v1", "realistic"), metrics, suite.summarize(metrics))
 
     rivals = [result("PI", 9 + np.linspace(0, 2, 20)), result("Oracle", np.zeros(20))]
     good, poor = result("PPO", np.full(20, 2.5)), result("SAC", np.linspace(5, 14, 20))
@@ -98,26 +98,26 @@ def test_the_share_that_is_closed_and_whether_intervals_are_apart():
 
 
 def test_retraining_fills_a_folder_as_that_of_the_shipped_policies(tmp_path):
-    config = RetrainConfig(out=tmp_path, learners=("PPO",), env_ids=("CCR/LoadCell-v0",), seeds=2, share=1e-6, jobs=1)
+    config = RetrainConfig(out=tmp_path, learners=("PPO",), env_ids=("CCR/LoadCell-v1",), seeds=2, share=1e-6, jobs=1)
     retrain(config)
-    files = trained("PPO", "CCR/LoadCell-v0", tmp_path)
+    files = trained("PPO", "CCR/LoadCell-v1", tmp_path)
     assert [file.name for file in files] == ["0.safetensors", "1.safetensors"]
     assert [LearnedPolicy(file).training.config.seed for file in files] == [0, 1000]
-    before = [file.stat().st_mtime_ns for file in tmp_path.glob(f"PPO/LoadCell-v0/*/{ACTOR}")]
+    before = [file.stat().st_mtime_ns for file in tmp_path.glob(f"PPO/LoadCell-v1/*/{ACTOR}")]
     retrain(config)
-    assert [file.stat().st_mtime_ns for file in tmp_path.glob(f"PPO/LoadCell-v0/*/{ACTOR}")] == before
+    assert [file.stat().st_mtime_ns for file in tmp_path.glob(f"PPO/LoadCell-v1/*/{ACTOR}")] == before
     with pytest.raises(ValueError, match="a run with other settings"):
         retrain(replace(config, share=1.0))
 
 
 def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
     arguments = ["sweep", "--what", "PI", "--trials", "2", "--episodes", "2", "--out", str(tmp_path)]
-    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments, "--env-id", "CCR/LoadCell-v0"])
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments, "--env-id", "CCR/LoadCell-v1"])
     cli.main()
     cli.main()
     cli.main()
     assert "Best of 6" in capsys.readouterr().out
-    study = optuna.load_study(study_name=None, storage=f"sqlite:///{tmp_path}/PI-LoadCell-v0.db")
+    study = optuna.load_study(study_name=None, storage=f"sqlite:///{tmp_path}/PI-LoadCell-v1.db")
     assert len({tuple(trial.params.values()) for trial in study.trials}) == 6
 
 
@@ -125,11 +125,11 @@ def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
 def test_a_sweep_finds_settings_of_every_learner(learner, tmp_path, monkeypatch):
     def instead(config, progress):
         tried.append(config.learner)
-        return trained("Distilled", "CCR/LoadCell-v0")[0]
+        return trained("Distilled", "CCR/LoadCell-v1")[0]
 
     tried = []
     monkeypatch.setattr(training, "train", instead)
-    config = SweepConfig(what=learner, env_id="CCR/LoadCell-v0", trials=2, episodes=1, steps=640, out=tmp_path)
+    config = SweepConfig(what=learner, env_id="CCR/LoadCell-v1", trials=2, episodes=1, steps=640, out=tmp_path)
     sweep(config)
     assert [(settings.name, settings.steps) for settings in tried] == [(learner, 640)] * 2
     assert tried[0] != tried[1]
@@ -143,7 +143,7 @@ def test_a_sweep_finds_settings_of_every_learner(learner, tmp_path, monkeypatch)
         ("evaluate", "--policies", "PID"),
         ("evaluate", "--seed", "5"),
         ("retrain", "--share", "0"),
-        ("sweep", "--env-id", "CCR/Nope-v0"),
+        ("sweep", "--env-id", "CCR/Nope-v1"),
         ("train", "--env-id", "Pendulum-v1"),
         ("train", "--env-id", "nope"),
         ("train", "--threads", "0"),
@@ -175,11 +175,11 @@ def test_runs_of_different_sensing_are_not_compared(run, tmp_path):
 
 
 def test_a_policy_in_the_folder_of_another_is_named(tmp_path, monkeypatch, capsys):
-    file = tmp_path / "SAC" / "TrackForce-v0" / f"0{SUFFIX}"
+    file = tmp_path / "SAC" / "TrackForce-v1" / f"0{SUFFIX}"
     file.parent.mkdir(parents=True)
-    arguments = ["--policies", "SAC", "--env-ids", "CCR/TrackForce-v0", "--pretrained", str(tmp_path)]
+    arguments = ["--policies", "SAC", "--env-ids", "CCR/TrackForce-v1", "--pretrained", str(tmp_path)]
     monkeypatch.setattr(sys, "argv", ["ccr-gym", "evaluate", "--out", str(tmp_path / "out"), *arguments])
-    for learner, env_id in (("SAC", "CCR/LoadCell-v0"), ("PPO", "CCR/TrackForce-v0")):
+    for learner, env_id in (("SAC", "CCR/LoadCell-v1"), ("PPO", "CCR/TrackForce-v1")):
         shutil.copyfile(trained(learner, env_id)[0], file)
         with pytest.raises(SystemExit) as ended:
             cli.main()
@@ -189,7 +189,7 @@ def test_a_policy_in_the_folder_of_another_is_named(tmp_path, monkeypatch, capsy
     file.unlink()
     file.mkdir()
     with pytest.raises(UserError, match="is a folder"):
-        suite.entries(EvaluateConfig(policies=("SAC",), env_ids=("CCR/TrackForce-v0",), pretrained=tmp_path))
+        suite.entries(EvaluateConfig(policies=("SAC",), env_ids=("CCR/TrackForce-v1",), pretrained=tmp_path))
     assert not (tmp_path / "out").exists()
 
 
@@ -249,7 +249,7 @@ def test_no_policy_gives_the_numbers_of_another(env_id):
 
 @pytest.mark.parametrize("noise", [0.02, None], ids=["other weights", "untrained"])
 def test_other_weights_do_not_give_the_numbers_of_the_table(noise, tmp_path):
-    env_id = "CCR/LoadCell-v0"
+    env_id = "CCR/LoadCell-v1"
     tensors, values = read_tensors(trained("PPO", env_id)[0])
     torch.manual_seed(0)
     for name, weight in tensors.items():

@@ -38,8 +38,8 @@ def test_it_regulates_with_realistic_sensing(env_id):
 
 def test_it_forgets_the_episode_before():
     controller = PredictiveController()
-    first, second = (run_episodes(controller, "CCR/PushObstacle-v0", 7, 1, sensing="realistic")[0] for _ in range(2))
-    assert np.array_equal(first.true, second.true)
+    first, second = (run_episodes(controller, "CCR/PushObstacle-v1", 7, 1, sensing="realistic")[0] for _ in range(2))
+    assert np.array_equal(first.force, second.force)
 
 
 def test_every_environment_has_settings_of_its_own():

@@ -13,7 +13,7 @@ def test_what_is_hidden_is_enough_to_be_exact(env_id, sensing):
         assert np.median(episode.error[-20:]) < 0.01
 
 
-@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v0", "CCR/InsertAndPush-v0"])
+@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/InsertAndPush-v1"])
 def test_without_what_is_hidden_newton_is_exact_if_nothing_is_and_far_from_the_oracle_else(env_id):
     (ideal,) = run_episodes(NewtonController(), env_id, seed=50, count=1)
     assert ideal.error[-1] < 1e-6

@@ -230,7 +230,7 @@ def test_a_damaged_checkpoint_ends_the_command_in_one_line(saved, tmp_path, monk
 @pytest.mark.parametrize("learner", sorted(SMALL))
 def test_actors(learner, tmp_path):
     def refused(damage, message):
-        tensors, values = read_tensors(trained(learner, "CCR/LoadCell-v0")[0])
+        tensors, values = read_tensors(trained(learner, "CCR/LoadCell-v1")[0])
         damage(tensors, values)
         write_tensors(tmp_path / ACTOR, tensors, values)
         with pytest.raises(UserError, match=rf"is not a trained policy .*{message}.*; remove it, and train again"):

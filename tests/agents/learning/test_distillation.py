@@ -32,9 +32,9 @@ def test_the_teacher_is_exact_and_moves_nothing_by_trying(env_id):
 
 
 def test_the_teacher_does_what_newtons_controller_does():
-    envs = MemoryVecEnv(SB3VecEnv("CCR/PushObstacle-v0", 1, 8, obs_mode="dict", sensing="realistic"))
+    envs = MemoryVecEnv(SB3VecEnv("CCR/PushObstacle-v1", 1, 8, obs_mode="dict", sensing="realistic"))
     env, controller = (
-        make("CCR/PushObstacle-v0", sensing="realistic", disable_env_checker=True),
+        make("CCR/PushObstacle-v1", sensing="realistic", disable_env_checker=True),
         NewtonController.knowing(),
     )
     envs.reset()
@@ -52,7 +52,7 @@ def test_the_teacher_does_what_newtons_controller_does():
 def test_a_student_learns(tmp_path, monkeypatch):
     monkeypatch.setattr(distillation, "VALIDATION_EPISODES", 8)
     settings = DistilledSettings(steps=8 * 64 * 24, envs=24, gradient_steps=60, batch_size=256, width=32)
-    config = TrainConfig(run=tmp_path, env_id="CCR/LoadCell-v0", learner=settings)
+    config = TrainConfig(run=tmp_path, env_id="CCR/LoadCell-v1", learner=settings)
     student = LearnedPolicy(train(config, progress=False))
     assert student.name == "Distilled"
     assert student.training.curve.returns[-1] > student.training.curve.returns[0]

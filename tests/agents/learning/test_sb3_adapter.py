@@ -10,7 +10,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 import ccr_gym  # noqa: F401 - registers the ids
 from agents.learning.sb3_adapter import SB3VecEnv
 
-ENV_ID, COUNT = "CCR/PushObstacle-v0", 4
+ENV_ID, COUNT = "CCR/PushObstacle-v1", 4
 
 
 def test_equals_the_environments_that_sb3_makes():

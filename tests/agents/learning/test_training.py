@@ -160,7 +160,7 @@ def test_a_run_killed_after_every_checkpoint_learns_as_one_left_alone(name, tmp_
         monkeypatch.setattr(module, "VALIDATION_EPISODES", 16)
         monkeypatch.setattr(module, "CURVE_POINTS", 4)
     monkeypatch.setattr(checkpoint, "CHECKPOINTS", ROLLOUTS[name])
-    kwargs = {"env_id": "CCR/LoadCell-v0", "sensing": "ideal", "learner": LEARNING[name], "threads": 1}
+    kwargs = {"env_id": "CCR/LoadCell-v1", "sensing": "ideal", "learner": LEARNING[name], "threads": 1}
     alone = until_finished(TrainConfig(run=tmp_path / "alone", **kwargs)).training.curve.returns
     kills = request.getfixturevalue("killed")
     killed = until_finished(TrainConfig(run=tmp_path / "killed", **kwargs)).training.curve.returns
@@ -325,7 +325,7 @@ def damaged(content, witness):
 def test_a_foreign_actor_is_refused_and_runs_nothing(tmp_path):
     with pytest.raises(FileNotFoundError, match="train first"):
         LearnedPolicy(tmp_path)
-    for content in damaged(trained("PPO", "CCR/LoadCell-v0")[0].read_bytes(), tmp_path / "witness"):
+    for content in damaged(trained("PPO", "CCR/LoadCell-v1")[0].read_bytes(), tmp_path / "witness"):
         (tmp_path / ACTOR).write_bytes(content)
         with pytest.raises(UserError, match="not a trained policy"):
             LearnedPolicy(tmp_path)
@@ -336,7 +336,7 @@ def test_a_foreign_actor_is_refused_and_runs_nothing(tmp_path):
     ("change", "message"),
     [
         ({"format": 3}, "its format is 3"),
-        ({"env_id": "planted:Env-v0"}, "env_id is"),
+        ({"env_id": "planted:Env-v1"}, "env_id is"),
         ({"sensing": "none"}, "sensing is"),
         ({"learner": {"name": "PPO", "width": 10**9}}, "not a trained policy"),
         ({"learner": {"name": "PPO", "gamma": "x"}}, "gamma is"),
@@ -345,7 +345,7 @@ def test_a_foreign_actor_is_refused_and_runs_nothing(tmp_path):
 def test_an_actor_of_another_make_is_refused_and_imports_nothing(tmp_path, monkeypatch, change, message):
     (tmp_path / "planted.py").write_text("from pathlib import Path; Path(__file__).with_suffix('.witness').touch()")
     monkeypatch.syspath_prepend(tmp_path)
-    tensors, values = read_tensors(trained("PPO", "CCR/LoadCell-v0")[0])
+    tensors, values = read_tensors(trained("PPO", "CCR/LoadCell-v1")[0])
     config = json.loads(values["config"])
     values |= {key: value for key, value in change.items() if key == "format"}
     values["config"] = json.dumps(config | change) if "format" not in change else values["config"]
@@ -356,7 +356,7 @@ def test_an_actor_of_another_make_is_refused_and_imports_nothing(tmp_path, monke
 
 
 def test_an_actor_that_is_not_finite_is_refused(tmp_path):
-    tensors, values = read_tensors(trained("PPO", "CCR/LoadCell-v0")[0])
+    tensors, values = read_tensors(trained("PPO", "CCR/LoadCell-v1")[0])
     write_tensors(tmp_path / ACTOR, tensors | {"mean": tensors["mean"] * torch.nan}, values)
     with pytest.raises(UserError, match="not finite"):
         LearnedPolicy(tmp_path)
@@ -386,9 +386,9 @@ def test_a_damaged_checkpoint_is_refused_and_runs_nothing(tmp_path, monkeypatch,
 
 
 def test_an_observation_of_another_environment_is_refused():
-    policy = LearnedPolicy(trained("Distilled", "CCR/PushObstacle-v0")[0])
-    env = gymnasium.make("CCR/TrackForce-v0", sensing="realistic", disable_env_checker=True)
-    with pytest.raises(ValueError, match="trained on CCR/PushObstacle-v0 with realistic sensing"):
+    policy = LearnedPolicy(trained("Distilled", "CCR/PushObstacle-v1")[0])
+    env = gymnasium.make("CCR/TrackForce-v1", sensing="realistic", disable_env_checker=True)
+    with pytest.raises(ValueError, match="trained on CCR/PushObstacle-v1 with realistic sensing"):
         policy.act(env.reset(seed=0)[0])
 
 
