@@ -3,12 +3,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test lint native sanitize bench instructions soak clean
+.PHONY: demo test coverage lint native sanitize address thread bench instructions soak clean
 
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
 CHECK = $(BIN)/ctest --output-on-failure --test-dir
 CXX_FILES = $(shell git ls-files "*.cpp" "*.hpp" "*.inc")
+CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 SEED ?= 1
 FUZZ ?= 45
 
@@ -19,6 +20,9 @@ demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controllers, wr
 test: $(INSTALL)
 	$(BIN)/python -m pytest -n auto --dist worksteal $(PYTEST)
 
+coverage: PYTEST = --cov --cov-report=term
+coverage: test  ## the same, and which lines of the packages they run
+
 lint: $(INSTALL)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -27,16 +31,20 @@ lint: $(INSTALL)
 
 native: $(INSTALL)  ## tests of the kernel in C++ (needs doctest: apt-get install doctest-dev)
 	$(NATIVE) build/native
-	$(BUILD) build/native --parallel
+	$(BUILD) build/native --parallel $(CORES)
 	$(CHECK) build/native
 
-sanitize: $(INSTALL)  ## the same under ASan and UBSan, FUZZ seconds of random scenes from a SEED on, and the batch under TSan
+sanitize: address thread  ## the same under ASan and UBSan, FUZZ seconds of random scenes from a SEED on, and the batch under TSan
+
+address: $(INSTALL)
 	$(NATIVE) build/address -DCCR_SANITIZE=address,undefined
-	$(BUILD) build/address --parallel
+	$(BUILD) build/address --parallel $(CORES)
 	$(CHECK) build/address
 	build/address/fuzz $(SEED) $(FUZZ)
+
+thread: $(INSTALL)
 	$(NATIVE) build/thread -DCCR_SANITIZE=thread
-	$(BUILD) build/thread --parallel --target batch_tests
+	$(BUILD) build/thread --parallel $(CORES) --target batch_tests
 	build/thread/batch_tests
 
 bench: $(INSTALL)

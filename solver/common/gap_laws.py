@@ -98,6 +98,7 @@ def gap_function(law: GapLaw) -> ca.Function:
     return ca.Function(f"ccr_{law.kind}_gap", [point, shape], [ca.cse(ca.densify(outputs))])
 
 
+@lru_cache(maxsize=64)
 def clearance_function(law: GapLaw) -> ca.Function:
     """Return ``(p, shape) → c`` of one kind of obstacle, where the slopes are not needed."""
     point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
@@ -107,4 +108,4 @@ def clearance_function(law: GapLaw) -> ca.Function:
 def gaps_of(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
     """Return the gaps of points, given as columns, to an obstacle."""
     count = points.shape[1]
-    return gap_function(law).map(count)(points, ca.repmat(shape, 1, count))[0, :].T
+    return clearance_function(law).map(count)(points, ca.repmat(shape, 1, count)).T

@@ -28,16 +28,24 @@ void ModelContinuation<Model>::keep_last_held(const Iterate& held) {
 }
 
 // `present_` is below the tension limit, `trial_` above: closes in from below by false position (Illinois), aiming into
-// the middle of the accepted band. False where the branch cannot be followed that far.
+// the middle of the accepted band, with the cables that `trial_` takes beyond the limit: others may be held at it
+// already. False where the branch cannot be followed that far.
 template <class Model>
 bool ModelContinuation<Model>::approach_tension_limit() {
-  const double aim = problem_.robot().max_tension * (1 - kTensionBand / 2);
+  const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
+  Tensions above = trial_tensions_;
+  const auto approaching = [&] {
+    double tension = highest(above) > limit ? -HUGE_VAL : highest(tensions_);
+    for (int k = 0; k < kCables; ++k)
+      if (above[k] > limit) tension = std::max(tension, tensions_[k]);
+    return tension;
+  };
   const Command start = present_.command, end = trial_.command;
   const double span = command_distance(start, end);
   double low = 0, high = 1;  // fractions of the way
-  double excess = highest(trial_tensions_) - aim, shortage = highest(tensions_) - aim;
+  double excess = highest(trial_tensions_) - aim, shortage = approaching() - aim;
   Move last = Move::kRejected;
-  for (int i = 0; i < kStallIterations && !is_at_tension_limit(); ++i) {
+  for (int i = 0; i < kStallIterations && approaching() < limit * (1 - kTensionBand); ++i) {
     const double width = high - low;
     if (!(width * span > kCommandResolution)) break;
     const double middle =
@@ -47,10 +55,11 @@ bool ModelContinuation<Model>::approach_tension_limit() {
     if (move == Move::kAccepted) {
       accept();
       low = middle;
-      shortage = highest(tensions_) - aim;
+      shortage = approaching() - aim;
       if (move == last) excess /= 2;
     } else {
       high = middle;
+      above = trial_tensions_;
       excess = highest(trial_tensions_) - aim;
       if (move == last) shortage /= 2;
     }

@@ -45,7 +45,9 @@ def test_residuals(model, scene, start, changes):
 
 @EVERY_MODEL
 @pytest.mark.parametrize(
-    ("touch", "scenes"), [({}, 60), ({"touch": LINES, "between": 3}, 20)], ids=["paper", "everywhere"]
+    ("touch", "scenes"),
+    [({"segments": 9, "between": 1}, 60), ({"segments": 6, "touch": LINES, "between": 3}, 20)],
+    ids=["paper", "everywhere"],
 )
 def test_residuals_of_every_shape(random_shapes, model, touch, scenes):
     robot, generator = replace(Robot.prototype(model="paper"), model=model, **touch), np.random.default_rng(3)

@@ -46,7 +46,8 @@ LOADED = replace(
     loads=(Load(node=18, force=(0.02, 0.03), moment=1.5, at=(8.0, math.pi)), Load(node=7, force=(0.0, -0.02))),
 )
 ROBOTS = [*(replace(ROBOT, model=model) for model in MODELS), LOADED]
-EVERY_ROBOT = pytest.mark.parametrize("robot", ROBOTS, ids=[*MODELS, "loaded"])
+NAMES = [*MODELS, "loaded"]
+EVERY_ROBOT = pytest.mark.parametrize("robot", ROBOTS, ids=NAMES)
 OVAL = Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 4 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
 PUSHED = [
     Circle(center=(44, 104), radius=15),
@@ -62,11 +63,6 @@ SCENES = [
     *([replace(obstacle, spring=((0.4, 0.1), (0.1, 0.2)))] for obstacle in PUSHED),
     [Circle(center=(33, 89), radius=12.5, spring=1.0), Circle(center=(59, 140), radius=15)],
 ]
-EVERY_SCENE = pytest.mark.parametrize(
-    "obstacles",
-    SCENES,
-    ids=lambda scene: "+".join(o.kind + ("" if o.spring is None else " on a spring") for o in scene),
-)
 STEP = 1e-4
 ONE, SEVERAL = np.array([9.0]), np.array([9.0, -12.0, 4.5])  # displacements of cables; of several, the second is slack
 
@@ -135,21 +131,32 @@ def compare(slopes, row, ahead, behind):
     assert predicted(slopes, row) == pytest.approx(difference, rel=1e-5, abs=1e-9 + 1e-5 * np.abs(difference).max())
 
 
-@EVERY_ROBOT
-@EVERY_SCENE
-def test_cable_and_length(robot, obstacles):
-    equilibrium = solve(robot, obstacles)
+def label(obstacles):
+    return "+".join(o.kind + ("" if o.spring is None else " on a spring") for o in obstacles)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[(robot, obstacles) for obstacles in SCENES for robot in ROBOTS],
+    ids=[f"{label(obstacles)}-{name}" for obstacles in SCENES for name in NAMES],
+)
+def case(request):
+    """Robot, obstacles, and the sensitivities of their equilibrium: most of the time goes to stating the problem."""
+    equilibrium = solve(*request.param)
     assert equilibrium.contact.any()
-    slopes, rows = sensitivity(equilibrium), Sensitivity.rows(robot)
+    return *request.param, sensitivity(equilibrium)
+
+
+def test_cable_and_length(case):
+    robot, obstacles, slopes = case
     for row, change in enumerate(STEP * np.eye(len(robot.cables))):
         compare(slopes, row, solve(robot, obstacles, change), solve(robot, obstacles, -change))
-    compare(slopes, rows.length, *(solve(robot, obstacles, length=length) for length in (180 + STEP, 180 - STEP)))
+    ahead, behind = (solve(robot, obstacles, length=length) for length in (180 + STEP, 180 - STEP))
+    compare(slopes, Sensitivity.rows(robot).length, ahead, behind)
 
 
-@EVERY_ROBOT
-@EVERY_SCENE
-def test_obstacles(robot, obstacles):
-    slopes = sensitivity(solve(robot, obstacles))
+def test_obstacles(case):
+    robot, obstacles, slopes = case
     for j, obstacle in enumerate(obstacles):
         motions = np.eye(3 if isinstance(obstacle, Custom) else 4)  # a family need not hold the grown shape
         for motion, one in enumerate(motions):

@@ -80,3 +80,28 @@ def test_a_motor_never_ends_above_its_limit_where_a_release_snaps_twice():
     for cables in recorded["commands_mm"]:
         state = solver.step(state, cables)
         assert state.tensions.max() <= robot.max_tension
+
+
+@pytest.mark.parametrize("command", [(6.5, -9.8), (-7.7, -5.0), (12.0, 4.6), (4.4, 12.0)])
+def test_each_cable_of_a_free_robot_goes_to_its_own_limit_at_once(command):
+    """Where one is held at the limit already, the other is still followed up to it."""
+    solver = SpatialSolver(SpatialRobot.prototype(model="paper", max_tension=1.87), Scene())
+    stalled = solver.step(solver.rest(), command)
+    assert stalled.status is Status.STALLED
+    assert stalled.tensions == pytest.approx(np.full(2, 1.87), rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", [54, 71, 121, 126, 127, 140, 149])
+def test_a_stalled_step_stays_where_it_is_when_its_command_is_repeated(seed, random_solver):
+    generator, stalls = np.random.default_rng(seed), 0
+    limit = float(generator.uniform(1.5, 6))
+    solver = random_solver(generator, SpatialRobot.prototype(model="paper", max_tension=limit))
+    state = solver.rest()
+    for command in generator.uniform(-12, 12, (6, 2)):
+        state = solver.step(state, command)
+        if state.status is Status.STALLED:
+            again = solver.step(state, command)
+            assert again.status is Status.STALLED
+            assert again.cables_mm == pytest.approx(state.cables_mm, abs=1e-4 * solver.robot.offset_mm)
+            stalls += 1
+    assert stalls

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from solver import Cable, Scene, Status
@@ -33,4 +34,33 @@ def test_cables_go_slack_on_a_robot_that_is_straight_then():
         state = solver.step(state, (pull, -1.3, -4.0, -2.0))
         assert state.status is Status.CONVERGED
     assert not state.tensions.any()
+    assert state.slacks_mm == pytest.approx([0.07, 1.3, 4.0, 2.0], abs=1e-12)  # a straight robot takes up nothing
     assert state.nodes == pytest.approx(solver.rest().nodes, abs=1e-12)
+    taut = solver.step(state, (0.05, -1.3, -4.0, -2.0))  # a bend of 0.05 / a takes T a = EI 0.05 / (a L)
+    assert taut.tensions == pytest.approx([5000 * 0.05 / (8**2 * 180), 0, 0, 0], rel=1e-3)
+    assert taut.slacks_mm[0] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ends", "limit", "pulls"),
+    [
+        ((18, 18, 18, 18, 18, 18), 6.6, (3.61, -5.94, 3.03, 2.77, -0.85, -2.67)),
+        ((18, 18, 18, 9, 18, 18), 10.4, (0.25, -2.85, 0.1, -0.86, 0.71, 4.23)),
+        ((9, 18, 9, 18, 18), 11.3, (-0.8, -0.73, -5.92, 3.95, -1.23)),
+    ],
+)
+def test_cables_on_the_edge_of_slack_do_not_keep_others_from_stalling(ends, limit, pulls):
+    """Roundoff leaves tensions of 1e-16 N of either sign: none is lost, none pushes, and all others reach the limit."""
+    cables = tuple(Cable(angle=2 * math.pi / len(ends) * k, end=end) for k, end in enumerate(ends))
+    robot = SpatialRobot.prototype(model="rod", cables=cables, max_tension=limit)
+    solver = SpatialSolver(robot, Scene())
+    state = solver.step(solver.rest(), pulls)
+    edge = solver.step(state, np.where(state.tensions > 0, state.cables_mm, state.cables_mm + state.slacks_mm))
+    assert state.status is Status.STALLED
+    for found in (state, edge):
+        assert (found.tensions >= 0).all()
+        assert found.slacks_mm.min() > -1e-9
+        assert np.abs(found.tensions * found.slacks_mm).max() < 1e-9
+        assert max(solver.optimality(found)) < 1e-9
+    tightened = solver.step(edge, np.where(edge.tensions > 1e-9, edge.cables_mm, edge.cables_mm + 1e-3))
+    assert np.abs(tightened.tensions * tightened.slacks_mm).max() < 1e-9

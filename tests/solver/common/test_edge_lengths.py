@@ -1,0 +1,57 @@
+"""``edges_mm`` bounds the distance of neighbouring points that can touch, in every shape that a rod can have."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solver import Robot, Scene, Solver, spatial
+from solver.planar.equilibrium import touching_points
+from solver.planar.robot import LINES
+
+SEGMENTS = 8
+ROUNDOFF = 1e-12
+shares = st.lists(st.floats(-1, 1), min_size=SEGMENTS, max_size=SEGMENTS).map(np.array)
+sizes = {
+    "model": st.just("rod"),
+    "segments": st.just(SEGMENTS),
+    "offset_mm": st.floats(2, 8),
+    "length_mm": st.floats(40, 250),
+    "rigidity": st.just(5000.0),
+    "max_tension": st.just(math.inf),
+    "disk_radius_mm": st.floats(8, 24),
+    "between": st.integers(0, 2),
+}
+
+
+def most_turn(robot):
+    """How far a segment may be bent at rest: short of where its disks meet, and of what a robot takes [rad]."""
+    return min(1.5, 0.999 * robot.segment_mm / robot.edge_mm)
+
+
+def assert_bounded(points, robot):
+    """Points of each line, (p, k, d), are no farther apart than its bound."""
+    lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).max(axis=1)
+    assert (lengths <= np.array(robot.edges_mm) * (1 + ROUNDOFF)).all()
+
+
+@given(robot=st.builds(Robot, touch=st.just(LINES), **sizes), turns=shares)
+def test_in_the_plane(robot, turns):
+    """The robot is at rest in the shape, as one that was made with it."""
+    curved = replace(robot, precurvature=tuple(most_turn(robot) * turns))
+    assert_bounded(touching_points(curved, Solver(curved, Scene()).rest().nodes), robot)
+
+
+@given(
+    robot=st.builds(spatial.SpatialRobot, touch=st.just(("backbone", "rim")), rim_points=st.just(6), **sizes),
+    turns=shares,
+    ways=st.lists(st.integers(0, 5), min_size=SEGMENTS, max_size=SEGMENTS),
+)
+def test_in_space(robot, turns, ways):
+    """Each segment bends straight away from one of the lines."""
+    angles = math.pi / 3 * np.array(ways) + math.pi / 2
+    bends = most_turn(robot) * turns[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    curved = replace(robot, precurvature=tuple((x, y, 0.0) for x, y in bends))
+    assert_bounded(spatial.SpatialSolver(curved, Scene()).rest().points, robot)

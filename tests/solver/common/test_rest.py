@@ -1,0 +1,57 @@
+"""Rest under loads: in equilibrium with all of them, and no cable beyond its tension limit where it can be paid out."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from solver import PRESETS, Load, Robot, Scene, Solver, Status, spatial
+
+KINDS = {"plane": (Robot, Solver), "space": (spatial.SpatialRobot, spatial.SpatialSolver)}
+PULLING = [case for case in product(PRESETS, KINDS) if case != ("prototype", "plane")]  # the one that pays nothing out
+RESTS = [Status.CONVERGED, Status.SNAPPED]  # in space a load may tip the robot over on the way to all of it
+
+
+def loaded(name, kind):
+    """A robot whose weight and dead forces, of 3 EI/L² together, bend it away from a cable."""
+    robot = KINDS[kind][0].preset(name, model="rod", max_tension=np.inf)
+    across = np.eye(2 if kind == "plane" else 3)[0]
+    down = np.roll(across, -1)
+    load = (-across - 0.5 * down) * robot.rigidity / robot.length_mm**2
+    tip, middle = Load(node=robot.segments, force=tuple(load)), Load(node=robot.segments // 2, force=tuple(0.5 * load))
+    return replace(robot, weight_per_length=tuple(1.5 * load / robot.length_mm), loads=(tip, middle))
+
+
+def rest(robot, limit, kind):
+    return KINDS[kind][1](replace(robot, max_tension=limit), Scene()).rest()
+
+
+def unbalanced(state):
+    """The residuals of the node-coordinate problem, all loads included, in natural units."""
+    length = state.length_mm
+    return max(np.array(state.residuals()) * [length, 1 / length, 1 / length, 1.0, length])
+
+
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_rests_right_below_the_tension_limit(name, kind):
+    robot = loaded(name, kind)
+    free = rest(robot, np.inf, kind)
+    held = rest(robot, free.tensions.max() * (1 + 1e-7), kind)
+    assert free.tensions.max() > 0
+    for state in (free, held):
+        assert state.status in (RESTS if kind == "space" else RESTS[:1])
+        assert unbalanced(state) < 1e-9
+    assert held.nodes == pytest.approx(free.nodes, abs=1e-9 * robot.length_mm)
+
+
+@pytest.mark.parametrize(("name", "kind"), PULLING)
+@pytest.mark.parametrize("share", [0.999, 0.5])
+def test_pays_out_what_the_motors_cannot_hold(name, kind, share):
+    robot = loaded(name, kind)
+    limit = share * rest(robot, np.inf, kind).tensions.max()
+    state = rest(robot, limit, kind)
+    assert state.status is Status.STALLED
+    assert state.tensions.max() <= limit
+    assert unbalanced(state) < 1e-9
