@@ -15,6 +15,10 @@ class State(Protocol):
     def block(self) -> np.ndarray:
         """All numbers of the equilibrium."""
 
+    @property
+    def scene(self) -> object:
+        """The obstacles."""
+
 
 StateT = TypeVar("StateT", bound=State)
 Command = ParamSpec("Command")
@@ -61,7 +65,8 @@ class MemoStatistics(NamedTuple):
 class TransitionMemo(Generic[StateT, Command]):
     """Wraps a solver and remembers its latest steps, for work that repeats them: resets, replays, planners.
 
-    A step depends on the numbers of the state and on the command alone; these are the key. Not thread-safe.
+    A step depends on the numbers of the state and on the command alone, and on where obstacles move from and to; these
+    are the key. Not thread-safe.
 
     Args:
         solver: Solves the steps that are not in the memo.
@@ -99,7 +104,8 @@ class TransitionMemo(Generic[StateT, Command]):
             ValueError: As the solver; the memo is left unchanged.
         """
         numbers = self._solver.check_command(equilibrium, *args, **kwargs)
-        key = equilibrium.block.tobytes(), numbers
+        scene = kwargs.get("scene")  # where obstacles move to
+        key = equilibrium.block.tobytes(), numbers, None if scene is None else (equilibrium.scene, scene)
         reached = self._reached.get(key)
         if reached is not None:
             self._reached.move_to_end(key)
@@ -113,7 +119,7 @@ class TransitionMemo(Generic[StateT, Command]):
 
     def clear(self) -> None:
         """Forget all steps and reset the statistics."""
-        self._reached: OrderedDict[tuple[bytes, tuple[float, ...]], StateT] = OrderedDict()
+        self._reached: OrderedDict[tuple[bytes, tuple[float, ...], object], StateT] = OrderedDict()
         self._hits = self._misses = 0
 
     @property

@@ -12,7 +12,7 @@ from solver.common.equilibrium import BaseEquilibrium, RobotT_co
 from solver.common.geometry import touching_gaps
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
-from solver.common.rows import RowBatch
+from solver.common.rows import Motion, RowBatch
 from solver.common.scene import MAX_OBSTACLES, Scene
 from solver.common.status import Status
 from solver.common.validation import (
@@ -27,6 +27,7 @@ from solver.common.validation import (
 EquilibriumT_co = TypeVar("EquilibriumT_co", bound=BaseEquilibrium[AnyRobot], covariant=True)
 
 MAX_PULL_STEPS = 100_000  # of a trial pull
+UNMOVED = -1.0  # in place of a part of the way
 
 
 class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
@@ -133,32 +134,42 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             self.commands[indices] = self.blocks[indices, : self.cables + 1]  # cables and length
             self._unrested.difference_update(indices)
 
-    def step(self, cable_mm: np.ndarray, robots: Sequence[int] | None = None) -> None:
+    def step(
+        self, cable_mm: np.ndarray, robots: Sequence[int] | None = None, scenes: Sequence[Scene] | None = None
+    ) -> None:
         """Move the cables of all robots, or of some, as far as tension and obstacles allow.
 
         Args:
             cable_mm: Commanded cable displacement of each of them, ``(k,)``, of several cables ``(k, c)`` [mm].
             robots: Indices of the robots; ``None`` for all.
+            scenes: Where the obstacles of each of them move to within the step, as in ``step`` of the solver; ``None``
+                if none moves. Where they are then, :meth:`scene` tells.
 
         Raises:
             ValueError: If a command or a length in :attr:`blocks` is out of range, an index is out of range or
-                repeated, or a robot was not brought to rest in its scene; nothing has moved then.
+                repeated, a robot was not brought to rest in its scene, or obstacles cannot move to a scene; nothing
+                has moved then.
         """
         indices = self._all if robots is None else self._check_indices(robots)
         shape = (len(indices),) if self.cables == 1 else (len(indices), self.cables)
         commands = check_array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
+        motions = self._motions(indices, scenes)
         with self._exclusive:
             self._check_rested(indices)
             self._check_lengths(indices)
             self.commands[indices, :-1] = commands.reshape(-1, self.cables)
-            self._move(indices)
+            self._move_among(indices, motions)
 
-    def move(self, robots: int | slice | list[int]) -> None:
+    def move(self, robots: int | slice | list[int], scenes: Sequence[Scene] | None = None) -> None:
         """Move one robot, some or all to their :attr:`commands`, which must be in range.
 
+        Args:
+            robots: Their indices.
+            scenes: Where the obstacles of each of them move to meanwhile, as in :meth:`step`.
+
         Raises:
-            ValueError: If an index is out of range or repeated, or a robot was not brought to rest in its scene;
-                nothing has moved then.
+            ValueError: If an index is out of range or repeated, a robot was not brought to rest in its scene, or
+                obstacles cannot move to a scene; nothing has moved then.
         """
         if isinstance(robots, slice):
             indices = self._all[robots]
@@ -166,9 +177,10 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             indices = self._check_indices(robots)
         else:
             indices = [self._check_index(robots)]
+        motions = self._motions(indices, scenes)
         with self._exclusive:
             self._check_rested(indices)
-            self._move(indices)
+            self._move_among(indices, motions)
 
     def probe(self, commands: np.ndarray) -> np.ndarray:
         """Return the equilibria that all robots would move to, ``(N, size)``, without moving them.
@@ -278,6 +290,25 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
 
     def _rest(self, robots: list[int]) -> None:
         self._kernel_batch.rest(robots, self.robot.length_mm, self.blocks, *self._work)
+
+    def _move_among(self, robots: list[int], motions: list[Motion]) -> None:
+        """Move robots, some of them while their obstacles move."""
+        if not motions:
+            return self._move(robots)
+        moving = [motion.robot for motion in motions]
+        parts = np.full(len(motions), UNMOVED)
+        try:
+            self._move_into(moving, motions, parts)
+        finally:  # also of those that had moved when the call was interrupted
+            for motion, part in zip(motions, parts.tolist(), strict=True):
+                if part != UNMOVED:
+                    self._place(motion, part)
+        still = set(robots).difference(moving)
+        return self._move([robot for robot in robots if robot in still])
+
+    def _move_into(self, robots: list[int], motions: list[Motion], parts: np.ndarray) -> None:
+        kernel_motions = [(motion.obstacles, motion.bounds) for motion in motions]
+        self._kernel_batch.move(robots, kernel_motions, self.commands, self.blocks, parts, *self._work)
 
     def _move(self, robots: list[int]) -> None:
         self._kernel_batch.step(robots, self.commands, self.blocks, *self._work)

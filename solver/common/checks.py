@@ -95,6 +95,20 @@ def check_origin(robot: AnyRobot, scene: Scene, equilibrium: BaseEquilibrium[Any
         raise ValueError("the equilibrium is of another scene; step from rest() of this solver")
 
 
+def check_start(robot: AnyRobot, space: int, equilibrium: BaseEquilibrium[AnyRobot], kind: type, scene: Scene) -> None:
+    """Check that an equilibrium is one of this robot, from which its obstacles can move to another scene.
+
+    Raises:
+        ValueError: Saying what differs, or why the robot cannot be in that scene.
+        TypeError: If it is not an equilibrium.
+    """
+    check_scene(robot, type(robot), scene, space)
+    check_instance("equilibrium", equilibrium, kind, "step from rest() of this solver")
+    check_origin(robot, equilibrium.scene, equilibrium, kind)
+    equilibrium.scene.check_motion(scene)
+    check_core(robot, scene)
+
+
 def check_memory(count: int, size: int) -> None:
     """Check that the blocks of all robots fit into memory.
 

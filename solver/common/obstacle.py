@@ -25,6 +25,7 @@ from solver.common.validation import (
 
 SHAPES = {shape.name.lower(): shape for shape in _kernel.Shape}
 FARTHEST = 100.0  # position or size of an obstacle, over the robot's longest length
+SHIFT_ROUNDING = 1e-12  # difference of the shifts of an obstacle's points, over their coordinates
 MAX_NODES = 4097  # of a robot
 SHARPEST = 1e-9  # smallest radius of an obstacle's surface, over that length
 
@@ -62,6 +63,7 @@ class Obstacle(ABC):
     space: ClassVar[int] = 2  # dimension of its points
     point_fields: ClassVar[tuple[str, ...]] = ("center",)  # which move with it
     size_fields: ClassVar[tuple[str, ...]] = ("radius",)
+    moving_fields: ClassVar[tuple[str, ...] | None] = None  # what may change in a motion; None for the two above
 
     nodes: tuple[int, ...] | None = None
     spring: float | Matrix | None = None
@@ -123,6 +125,43 @@ class Obstacle(ABC):
         shift = check_point("by", by, self.space)
         moved: dict[str, Any] = {name: _sum(getattr(self, name), shift) for name in self.point_fields}
         return replace(self, **moved)  # fields of the subclass
+
+    def moved_towards(self, other: Self, part: float) -> Self:
+        """Return the obstacle part of its way to another, its points and sizes in proportion.
+
+        Raises:
+            ValueError: If the other is not this one shifted, with other sizes or not.
+        """
+        self.check_motion(other)
+        names = self._moving_names()
+        return replace(self, **{name: _mix(getattr(self, name), getattr(other, name), part) for name in names})
+
+    def check_motion(self, other: object) -> float:
+        """Return a bound on how far the surface is from that of another, which must be a motion of this one [mm].
+
+        Raises:
+            ValueError: As :meth:`moved_towards`.
+        """
+        names = self._moving_names()
+        same = type(other) is type(self) and replace(self, **{name: getattr(other, name) for name in names}) == other
+        if not (same and isinstance(other, Obstacle) and self._is_shift(other)):
+            raise ValueError(
+                f"{shown(other)} is no motion of {shown(self)}: within a step an obstacle may shift and change its "
+                "sizes, but not turn or become another; begin at rest in the new scene"
+            )
+        sizes = zip(self._radii(), other._radii(), strict=True)
+        return math.dist(self._points()[0][1], other._points()[0][1]) + sum(abs(b - a) for (_, a), (_, b) in sizes)
+
+    def _is_shift(self, other: "Obstacle") -> bool:
+        """Return whether all points of another are those of this one shifted alike, but for rounding."""
+        points, others = (np.array([point for _, point in obstacle._points()]) for obstacle in (self, other))
+        if points.shape != others.shape:
+            return False
+        shifts = others - points
+        return bool(np.abs(shifts - shifts[0]).max() <= SHIFT_ROUNDING * np.abs([points, others]).max())
+
+    def _moving_names(self) -> tuple[str, ...]:
+        return self.moving_fields or (*self.point_fields, *self.size_fields)
 
     def check_proportion(self, length_mm: float) -> None:
         """Check that the obstacle is not too far, too large or too sharp for a robot of some length.
@@ -195,6 +234,13 @@ class Obstacle(ABC):
         measure = _kernel.measure_gaps if self.space == 2 else _kernel.measure_spatial_gaps
         measure(SHAPES[self.kind], np.array(self.parameters), points, gaps)
         return gaps
+
+
+def _mix(start: Any, end: Any, part: float) -> Any:
+    """Return a number, or nested tuples of them, part of the way to another, as the kernel does."""
+    if isinstance(start, tuple):
+        return tuple(_mix(a, b, part) for a, b in zip(start, end, strict=True))
+    return end if part == 1 or start == end else start + part * (end - start)
 
 
 def _sum(point: Point, shift: Point) -> Point:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Self
+from typing import Any, ClassVar, Generic, NamedTuple, Self
 
 import numpy as np
 
@@ -42,6 +42,22 @@ class Rows:
     iterations: np.ndarray
     factorizations: np.ndarray
     commands: np.ndarray
+
+
+class Motion(NamedTuple):
+    """Obstacles of a robot of a batch that move within a step.
+
+    Attributes:
+        robot: Index of the robot.
+        scene: Where they move to.
+        obstacles: The same as the kernel takes it.
+        bounds: Bounds on how far the surface of each moves [mm].
+    """
+
+    robot: int
+    scene: Scene
+    obstacles: Kernel
+    bounds: list[float]
 
 
 class RowBatch(ABC, Generic[RobotT_co]):
@@ -142,6 +158,31 @@ class RowBatch(ABC, Generic[RobotT_co]):
                     f"{name} of rows has the shape {numbers.shape} of {numbers.dtype}; it must be "
                     f"{(count, *present.shape[1:])} of {present.dtype}: take the rows of get_rows"
                 )
+
+    def _motions(self, robots: list[int], scenes: Sequence[Scene] | None) -> list[Motion]:
+        """Return the motions of obstacles to given scenes, of the robots whose obstacles move.
+
+        Raises:
+            ValueError: If there is not a scene for each robot, or obstacles cannot move to it.
+        """
+        if scenes is None:
+            return []
+        scenes = [scene for scene in check_sequence("scenes", scenes, "a list of scenes") if isinstance(scene, Scene)]
+        if len(scenes) != len(robots):
+            raise ValueError(f"scenes holds {len(scenes)} scenes; it must hold one for each of {len(robots)} robots")
+        moving = [(robot, scene) for robot, scene in zip(robots, scenes, strict=True) if scene != self.scene(robot)]
+        bounds = [self.scene(robot).check_motion(scene) for robot, scene in moving]
+        return [
+            Motion(robot, scene, self._compile(scene), moved)
+            for (robot, scene), moved in zip(moving, bounds, strict=True)
+        ]
+
+    def _place(self, motion: Motion, part: float) -> None:
+        """Put the obstacles of a robot where they have moved to."""
+        reached = self.scene(motion.robot).moved_towards(motion.scene, part)
+        compiled = motion.obstacles if part == 1 else self._kernel_obstacles(reached)
+        self._kernel_batch.set_obstacles(motion.robot, compiled)
+        self._scenes[motion.robot] = reached
 
     def _compile(self, scene: Scene) -> Kernel:
         """Return the obstacles of a scene as the kernel takes them.

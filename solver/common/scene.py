@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -49,6 +50,27 @@ class Scene:
 
     def __iter__(self) -> Iterator[Obstacle]:
         return iter(self.obstacles)
+
+    def moved_towards(self, other: Self, part: float) -> Self:
+        """Return the scene part of its way to another, all obstacles moved in proportion.
+
+        Raises:
+            ValueError: As :meth:`check_motion`.
+        """
+        self.check_motion(other)
+        if part == 1:
+            return other
+        return type(self)(a.moved_towards(b, part) for a, b in zip(self, other, strict=True))
+
+    def check_motion(self, other: Self) -> list[float]:
+        """Return bounds on how far the surface of each obstacle is from that in another scene [mm].
+
+        Raises:
+            ValueError: If an obstacle of the other scene is not that of this one shifted, with other sizes or not.
+        """
+        if len(other) != len(self):
+            raise ValueError(f"the scene moves to one of {len(other)} obstacles; it must keep its {len(self)}")
+        return [a.check_motion(b) for a, b in zip(self, other, strict=True)]
 
     @property
     def mounted(self) -> tuple[bool, ...]:

@@ -47,6 +47,8 @@ class Batch {
   // Puts a robot, by its index, among other obstacles.
   void set_obstacles(int robot, std::vector<Obstacle<D>> obstacles) { scenes_[robot] = std::move(obstacles); }
 
+  const std::vector<Obstacle<D>>& scene(int robot) const { return scenes_[robot]; }
+
   // Calls `work` with a continuation among the obstacles of each of these robots, and its index in the list, until
   // `stop` returns true. It is called in the calling thread only, between robots and amid their steps.
   template <class Work, class Stop>

@@ -34,6 +34,8 @@ void bind_kernel(nb::module_& m, const char* name) {
            "displacements of the obstacles, and why the step was given up.")
       .def("optimality", &Kernel<D>::optimality, "block"_a,
            "Return stationarity, gap and complementarity, without units.")
+      .def("move", &Kernel<D>::move, "from_"_a, "command"_a, "origins"_a, "towards"_a, "motions"_a, "to"_a,
+           "Step while the obstacles move from some to others. Return also which part of their way they have gone.")
       .def("rest", &Kernel<D>::rest, "length"_a, "to"_a,
            "Write the equilibrium at a length with no cable displaced. Return status, iterations and factorizations.")
       .def("step", &Kernel<D>::step, "from_"_a, "command"_a, "to"_a,
@@ -55,6 +57,10 @@ void bind_batch(nb::module_& m, const char* name) {
            "Put a robot among other obstacles. Its block stays as it is.")
       .def("rest", &rest<D>, "robots"_a, "length"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Bring some robots to rest at a length, in place.")
+      .def("move", &move<D>, "robots"_a, "motions"_a, "commands"_a, "blocks"_a, "parts"_a, "statuses"_a, "iterations"_a,
+           "factorizations"_a,
+           "Move some robots to their commands while their obstacles move to others, in place. Each motion is where the "
+           "obstacles go to, and bounds on how far their surfaces go.")
       .def("step", &step<D>, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Move some robots to their commands, cables and length, in place.")
       .def("optimality", &optimality<D>, "blocks"_a, "found"_a,

@@ -76,6 +76,26 @@ class Kernel {
     return {result.status, result.iterations, result.factorizations};
   }
 
+  std::tuple<Status, int, int, double> move(const Input& from, const std::vector<double>& command,
+                                            const std::vector<Obstacle<D>>& origins,
+                                            const std::vector<Obstacle<D>>& towards, const std::vector<double>& motions,
+                                            const Output& to) {
+    require_block(from);
+    require_size(to.size());
+    require_target(command);
+    for (const auto* scene : {&origins, &towards}) {
+      require(scene->size() == obstacles_.size(), "the scenes must have as many obstacles as that of the solver");
+      require_points(layout_, *scene);
+    }
+    require_motion(origins, towards, motions);
+    const Lease continuation(*this);
+    continuation->set_obstacles(origins);
+    const StepResult result = continuation->move(from.data(), command.data(), towards, motions, to.data());
+    continuation->set_obstacles(obstacles_);
+    if (result.interrupted) throw nb::python_error();
+    return {result.status, result.iterations, result.factorizations, result.scene};
+  }
+
   std::tuple<std::vector<double>, Reason> trace(const Input& from, const std::vector<double>& command) {
     require_block(from);
     require_target(command);
@@ -151,6 +171,23 @@ void require_blocks(const Batch<D>& batch, const Blocks& blocks) {
           "blocks must be (" + std::to_string(batch.count()) + ", " + std::to_string(batch.layout().size) + ")");
 }
 
+// Refuses arrays from which some robots cannot be moved.
+template <int D>
+void require_tables(const Batch<D>& batch, const std::vector<int>& robots, const Table& commands, const Blocks& blocks,
+                    const Counts& statuses, const Counts& iterations, const Counts& factorizations) {
+  const std::size_t count = batch.count(), size = batch.layout().size, cables = batch.layout().cables.size;
+  require_blocks(batch, blocks);
+  require(commands.shape(0) == count && commands.shape(1) == cables + 1,
+          "commands must have a row of cables and length for each robot");
+  require(statuses.shape(0) == count && iterations.shape(0) == count && factorizations.shape(0) == count,
+          "statuses, iterations and factorizations must have a number for each robot");
+  for (const int robot : robots) {
+    require_index(batch, robot);
+    require_sound(batch.layout(), blocks.data() + size * robot);
+    require_command(commands.data() + (cables + 1) * robot, cables);
+  }
+}
+
 // Works on these robots without the interpreter's lock, until a signal raises an error.
 template <int D, class Work>
 void each(Batch<D>& batch, const std::vector<int>& robots, Work work) {
@@ -160,6 +197,41 @@ void each(Batch<D>& batch, const std::vector<int>& robots, Work work) {
     batch.each(robots, work, interruption);
   }
   if (interruption.raised()) throw nb::python_error();
+}
+
+// A motion of the obstacles of one robot of a batch within its step.
+template <int D>
+using Motion = std::tuple<std::vector<Obstacle<D>>, std::vector<double>>;  // towards, and bounds
+
+// Like `step`, for robots whose obstacles move meanwhile; writes which part of their way each robot's have gone.
+template <int D>
+void move(Batch<D>& batch, const std::vector<int>& robots, const std::vector<Motion<D>>& motions, const Table& commands,
+          const Blocks& blocks, const Output& parts, const Counts& statuses, const Counts& iterations,
+          const Counts& factorizations) {
+  const typename Batch<D>::Lock lock(batch);
+  const std::size_t cables = batch.layout().cables.size, size = batch.layout().size;
+  require_tables(batch, robots, commands, blocks, statuses, iterations, factorizations);
+  require(motions.size() == robots.size() && parts.size() == robots.size(),
+          "motions and parts must have an entry for each robot that moves");
+  for (std::size_t k = 0; k < robots.size(); ++k) {
+    const auto& [towards, bounds] = motions[k];
+    require_points(batch.layout(), towards);
+    require_motion(batch.scene(robots[k]), towards, bounds);
+  }
+  double *block = blocks.data(), *part = parts.data();
+  const double* command = commands.data();
+  std::int64_t *status = statuses.data(), *iterated = iterations.data(), *factored = factorizations.data();
+  each(batch, robots, [&](Continuation<D>& continuation, int k) {
+    const int i = robots[k];
+    const auto& [towards, bounds] = motions[k];
+    const StepResult result =
+        continuation.move(block + size * i, command + (cables + 1) * i, towards, bounds, block + size * i);
+    if (result.interrupted) return;
+    part[k] = result.scene;
+    status[i] = static_cast<int>(result.status);
+    iterated[i] = result.iterations;
+    factored[i] = result.factorizations;
+  });
 }
 
 template <int D>
@@ -176,20 +248,11 @@ template <int D>
 void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands, const Blocks& blocks,
           const Counts& statuses, const Counts& iterations, const Counts& factorizations) {
   const typename Batch<D>::Lock lock(batch);
-  const std::size_t count = batch.count(), size = batch.layout().size, cables = batch.layout().cables.size;
-  require_blocks(batch, blocks);
-  require(commands.shape(0) == count && commands.shape(1) == batch.layout().cables.size + 1,
-          "commands must have a row of cables and length for each robot");
-  require(statuses.shape(0) == count && iterations.shape(0) == count && factorizations.shape(0) == count,
-          "statuses, iterations and factorizations must have a number for each robot");
+  const std::size_t size = batch.layout().size, cables = batch.layout().cables.size;
+  require_tables(batch, robots, commands, blocks, statuses, iterations, factorizations);
   double* block = blocks.data();
   const double* command = commands.data();
   std::int64_t *status = statuses.data(), *iterated = iterations.data(), *factored = factorizations.data();
-  for (const int robot : robots) {
-    require_index(batch, robot);
-    require_sound(batch.layout(), block + size * robot);
-    require_command(command + (cables + 1) * robot, cables);
-  }
   each(batch, robots, [&](Continuation<D>& continuation, int k) {
     const int i = robots[k];
     const StepResult result = continuation.follow(block + size * i, command + (cables + 1) * i, block + size * i);

@@ -128,6 +128,20 @@ void require_points(const BlockLayout& layout, const std::vector<Obstacle<D>>& o
             "touchable must have an entry for each point of the robot, " + std::to_string(layout.flags.size));
 }
 
+// Refuses obstacles that are not of the same kinds, and motions of them that are no bounds.
+template <int D>
+void require_motion(const std::vector<Obstacle<D>>& origins, const std::vector<Obstacle<D>>& towards,
+                    const std::vector<double>& motions) {
+  require(origins.size() == towards.size() && origins.size() == motions.size() && !motions.empty(),
+          "a motion needs obstacles, and as many where they go to, and as many bounds");
+  for (std::size_t j = 0; j < origins.size(); ++j) {
+    const Obstacle<D>&from = origins[j], &to = towards[j];
+    require(from.shape == to.shape && from.mounted == to.mounted && from.outline.size() == to.outline.size(),
+            "obstacles may move, not change their kind");
+    require(std::isfinite(motions[j]) && motions[j] >= 0, "a bound of a motion is not finite, or negative");
+  }
+}
+
 // Refuses commands that are not finite, and a length, the last number, that is not positive.
 inline void require_command(const double* command, std::size_t cables) {
   for (std::size_t k = 0; k <= cables; ++k)

@@ -7,6 +7,7 @@ import numpy as np
 from solver import _kernel
 from solver.common.batch import RobotBatch
 from solver.common.layout import Layout
+from solver.common.rows import Motion
 from solver.common.scene import Scene
 from solver.common.status import Status
 from solver.planar.equilibrium import Equilibrium, touching_points
@@ -57,6 +58,9 @@ class ReferenceBatch(BatchSolver):
         for robot in robots:
             wanted = self.commands[robot, :-1].tolist()
             self._keep(robot, self._reference(robot).step(self._equilibrium(robot), wanted))
+
+    def _move_into(self, robots: list[int], motions: list[Motion], parts: np.ndarray) -> None:
+        raise ValueError("obstacles of a ReferenceBatch do not move; use a BatchSolver")
 
     def _reference(self, robot: int) -> ReferenceSolver:
         return _reference(self.robot, self.scene(robot))

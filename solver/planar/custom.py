@@ -44,6 +44,7 @@ class Custom(Obstacle):
     """
 
     size_fields: ClassVar[tuple[str, ...]] = ("reach",)
+    moving_fields: ClassVar[tuple[str, ...] | None] = ("center",)
 
     family: Family
     sizes: tuple[float, ...] = ()

@@ -119,6 +119,7 @@ class Ellipse(Obstacle):
 
     law: ClassVar[GapLaw] = ELLIPSE
     size_fields: ClassVar[tuple[str, ...]] = ()
+    moving_fields: ClassVar[tuple[str, ...] | None] = ("center", "radii")
 
     center: Pair
     radii: Pair
@@ -215,6 +216,7 @@ class Polygon(Obstacle):
 
     law: ClassVar[GapLaw] = POLYGON
     point_fields: ClassVar[tuple[str, ...]] = ()
+    moving_fields: ClassVar[tuple[str, ...] | None] = ("corners", "radius")
 
     corners: tuple[Pair, ...]
     radius: float

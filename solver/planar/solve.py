@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solver import _kernel
-from solver.common.checks import check_core, check_origin, check_rest, check_scene
+from solver.common.checks import check_core, check_origin, check_rest, check_scene, check_start
 from solver.common.copying import RebuiltFromScene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles, kernel_rod
@@ -24,19 +24,28 @@ class CommandCheck(RebuiltFromScene):
     scene: Scene
 
     def check_command(
-        self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None
+        self,
+        equilibrium: Equilibrium,
+        cable_mm: float | Sequence[float],
+        length_mm: float | None = None,
+        *,
+        scene: Scene | None = None,
     ) -> tuple[float, ...]:
         """Return a command as floats, cables and length, with the present length where none is given.
 
         Raises:
-            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's, or one that the
+                obstacles cannot move from to a given scene.
             TypeError: If ``equilibrium`` is not one of the plane.
         """
         if type(cable_mm) is float and 0 < cable_mm <= self.robot.cable_limit_mm and len(self.robot.cables) == 1:
             cables: tuple[float, ...] = (cable_mm,)
         else:
             cables = check_cables(self.robot, "cable_mm", cable_mm)
-        check_origin(self.robot, self.scene, equilibrium, Equilibrium)
+        if scene is None:
+            check_origin(self.robot, self.scene, equilibrium, Equilibrium)
+        else:
+            check_start(self.robot, 2, equilibrium, Equilibrium, scene)
         return *cables, equilibrium.length_mm if length_mm is None else self.robot.check_length(length_mm)
 
 
@@ -76,7 +85,12 @@ class Solver(CommandCheck):
         return self._rest
 
     def step(
-        self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None
+        self,
+        equilibrium: Equilibrium,
+        cable_mm: float | Sequence[float],
+        length_mm: float | None = None,
+        *,
+        scene: Scene | None = None,
     ) -> Equilibrium:
         """Move the cables to displacements, and the base to an insertion, as far as tension and obstacles allow.
 
@@ -86,20 +100,30 @@ class Solver(CommandCheck):
                 ``robot.max_cable_mm`` [mm]. A negative one pays the cable out.
             length_mm: Commanded length of the backbone, within ``robot.length_range_mm`` [mm]; ``None`` keeps it. Both
                 are changed at proportional rates.
+            scene: Where the obstacles move to within the step, at a proportional rate: the equilibrium's scene, each
+                obstacle shifted or of other sizes. The equilibrium need not be of this solver's scene then. Where the
+                obstacles press so hard that the motor cannot hold the cable, it pays the cable out at the tension
+                limit; where that does not help, they stop.
 
         Returns:
             The equilibrium reached; its ``status`` says how. While anything touches, the cable of the paper's model is
             not slackened below a pretension of 0.00625 of ``robot.offset_mm``, where the shape would be undetermined;
-            a slack robot that is inserted into an obstacle ends in ``GAVE_UP``.
+            a slack robot that is inserted into an obstacle ends in ``GAVE_UP``. Its ``scene`` is where the obstacles
+            are: the scene they move to, unless they had to stop, ``BLOCKED``.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one of the plane.
         """
-        command = self.check_command(equilibrium, cable_mm, length_mm)
+        command = self.check_command(equilibrium, cable_mm, length_mm, scene=scene)
         reached = np.empty_like(equilibrium.block)
-        work = self._kernel.step(equilibrium.block, command, reached)
-        return Equilibrium.solved(self.robot, self.scene, reached, *work)
+        if scene is None:
+            work = self._kernel.step(equilibrium.block, command, reached)
+            return Equilibrium.solved(self.robot, self.scene, reached, *work)
+        start, bounds = equilibrium.scene, equilibrium.scene.check_motion(scene)
+        scenes = kernel_scene(self.robot, start), kernel_scene(self.robot, scene)
+        *work, part = self._kernel.move(equilibrium.block, command, *scenes, bounds, reached)
+        return Equilibrium.solved(self.robot, start.moved_towards(scene, part), reached, *work)
 
     def trace(
         self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None

@@ -206,6 +206,7 @@ class Box(SpatialObstacle):
 
     law: ClassVar[GapLaw] = BOX
     size_fields: ClassVar[tuple[str, ...]] = ("edge",)
+    moving_fields: ClassVar[tuple[str, ...] | None] = ("center", "sizes", "edge")
 
     center: Point
     sizes: Point

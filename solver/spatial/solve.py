@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solver import _kernel
-from solver.common.checks import check_core, check_origin, check_rest, check_scene
+from solver.common.checks import check_core, check_origin, check_rest, check_scene, check_start
 from solver.common.copying import RebuiltFromScene
 from solver.common.equilibrium import Optimality
 from solver.common.kernel_input import kernel_obstacles, kernel_rod
@@ -24,16 +24,24 @@ class SpatialCommandCheck(RebuiltFromScene):
     scene: Scene
 
     def check_command(
-        self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray
+        self,
+        equilibrium: SpatialEquilibrium,
+        cables_mm: Sequence[float] | np.ndarray,
+        *,
+        scene: Scene | None = None,
     ) -> tuple[float, ...]:
         """Return commanded displacements as floats.
 
         Raises:
-            ValueError: If it is out of range, or the equilibrium is another robot's or scene's.
+            ValueError: If it is out of range, or the equilibrium is another robot's or scene's, or one that the
+                obstacles cannot move from to a given scene.
             TypeError: If ``equilibrium`` is not one in space.
         """
         cables = check_cables(self.robot, "cables_mm", cables_mm)
-        check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
+        if scene is None:
+            check_origin(self.robot, self.scene, equilibrium, SpatialEquilibrium)
+        else:
+            check_start(self.robot, 3, equilibrium, SpatialEquilibrium, scene)
         return cables
 
 
@@ -70,7 +78,13 @@ class SpatialSolver(SpatialCommandCheck):
         """
         return self._rest
 
-    def step(self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray) -> SpatialEquilibrium:
+    def step(
+        self,
+        equilibrium: SpatialEquilibrium,
+        cables_mm: Sequence[float] | np.ndarray,
+        *,
+        scene: Scene | None = None,
+    ) -> SpatialEquilibrium:
         """Move both pairs of cables to displacements, at proportional rates, as far as tension and obstacles allow.
 
         A cable whose tension reaches the limit stops there, while the other moves on.
@@ -79,6 +93,7 @@ class SpatialSolver(SpatialCommandCheck):
             equilibrium: State to start from, of this solver or one of an equal robot and scene.
             cables_mm: Displacement of each cable, within ±``robot.max_cable_mm`` [mm]; a negative one pays it out. In
                 the paper's model that of each pair, whose sign selects the cable that is pulled.
+            scene: Where the obstacles move to within the step, as in the plane.
 
         Returns:
             The equilibrium reached; its ``status`` says how. While anything touches, the cables are not slackened
@@ -88,10 +103,15 @@ class SpatialSolver(SpatialCommandCheck):
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.
             TypeError: If ``equilibrium`` is not one in space.
         """
-        command = (*self.check_command(equilibrium, cables_mm), self.robot.length_mm)
+        command = (*self.check_command(equilibrium, cables_mm, scene=scene), self.robot.length_mm)
         reached = np.empty_like(equilibrium.block)
-        work = self._kernel.step(equilibrium.block, command, reached)
-        return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
+        if scene is None:
+            work = self._kernel.step(equilibrium.block, command, reached)
+            return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
+        start, bounds = equilibrium.scene, equilibrium.scene.check_motion(scene)
+        scenes = kernel_scene(self.robot, start), kernel_scene(self.robot, scene)
+        *work, part = self._kernel.move(equilibrium.block, command, *scenes, bounds, reached)
+        return SpatialEquilibrium.solved(self.robot, start.moved_towards(scene, part), reached, *work)
 
     def trace(self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray) -> Trace:
         """Return every shape accepted on the way of :meth:`step`, beginning with the present one.

@@ -77,9 +77,10 @@ struct Command {
   Vec<C> cables;     // displacements [mm]
   double length;     // of the backbone [mm]
   double loads = 1;  // part of a rod's loads that act
+  double scene = 1;  // part of their way that moving obstacles have gone
 
   friend bool operator==(const Command& a, const Command& b) {
-    return a.cables.v == b.cables.v && a.length == b.length && a.loads == b.loads;
+    return a.cables.v == b.cables.v && a.length == b.length && a.loads == b.loads && a.scene == b.scene;
   }
 };
 

@@ -41,7 +41,8 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   const double loss = energy_loss(command);
   if (left_branch(command, moved, loss)) return Move::kRejected;
   const double tension = highest(trial_tensions_), limit = problem_.robot().max_tension;
-  const bool pulled = pulls_cable(command) && command.length == present_.command.length;
+  const bool pulled =
+      pulls_cable(command) && command.length == present_.command.length && !moves_obstacles(command);
   const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
   const bool rising = pulled || (!loading && !only_releases(command) && tension > highest(tensions_));
   if (rising && tension > limit) return Move::kOverTension;
@@ -85,7 +86,8 @@ bool ModelContinuation<Model>::left_branch(const Command& command, double moved,
   // A free robot that bends evenly has but one branch, and one that is held tight has no room to jump.
   if ((bends_evenly_ && !problem_.touches_obstacle(present_.active)) || is_tight()) return false;
   if (has_trend_ && follows_trend()) return false;
-  if (command.length == present_.command.length && command.loads == present_.command.loads) {
+  if (command.length == present_.command.length && command.loads == present_.command.loads &&
+      !moves_obstacles(command)) {
     double unevenness = 0;  // work that a tension which does not change linearly may add or take
     for (int k = 0; k < kCables; ++k)
       unevenness += std::abs(pull(command, k) - pull(present_.command, k)) *

@@ -54,6 +54,7 @@ void ModelContinuation<Model>::read_block(const double* block) {
   read(block + layout_.onset.offset, onset_.v, layout_.cables.size);
   read_active_set(block);
   present_.command.loads = 1;
+  present_.command.scene = problem_.is_moving() ? 0 : 1;
   present_evaluated_ = false;
   if (problem_.has_loads()) evaluate_present();  // for the energy
   began_in_contact_ = problem_.touches_obstacle(present_.active);

@@ -41,6 +41,7 @@ void ContactProblem<Model>::update_broadphase(std::span<const Position> nodes, c
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
     clear_[j] = clearance(obstacles_[j], nodes) - reach_;
     if (mount_of_[j] >= 0) clear_[j] -= norm(mounts[mount_of_[j]]);
+    if (is_moving()) clear_[j] -= motions_[j];
   }
 }
 

@@ -34,6 +34,8 @@ ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
 template <class Model>
 void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
   obstacles_ = obstacles;
+  motions_ = {};
+  largest_motion_ = 0;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
   near_.clear();
   int mounts = 0;
@@ -48,6 +50,7 @@ template <class Model>
 bool ContactProblem<Model>::evaluate(const Iterate& at) {
   if (!model_.evaluate(at.command, at.controls)) return false;
   loaded_ = at.command.loads;
+  if (is_moving()) place_obstacles(at.command.scene);
   update_springs(at.mounts);
   if constexpr (Model::kRod) energy_ -= load_work();
   barrier_energy_ = 0;

@@ -87,6 +87,14 @@ class ContactProblem {
   // Switches to another scene with the same number of obstacles. The span must outlive its use.
   void set_obstacles(std::span<const Obstacle> obstacles);
 
+  // Lets the obstacles move evenly to others, with `Command::scene` from 0 to 1, until the next `set_obstacles`. The
+  // spans must outlive their use; `motions` bounds the motion of the surface of each [mm].
+  void move_obstacles(std::span<const Obstacle> towards, std::span<const double> motions);
+  bool is_moving() const { return !motions_.empty(); }
+  // Bound on the motion of the surface of any obstacle between two parts of the way, and the motion of one's centre.
+  double obstacle_motion(double from, double to) const { return largest_motion_ * std::abs(to - from); }
+  Position displacement(int obstacle, double from, double to) const;
+
   // Measures the distance of each obstacle from a shape, so that it is skipped while the robot stays close to that
   // shape.
   void update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts);
@@ -181,6 +189,7 @@ class ContactProblem {
   void add_barrier(const std::vector<Control>& controls);
   void update_springs(const std::vector<Position>& mounts);
   void measure_gaps();
+  void place_obstacles(double part);
   // Those of a shape are placed where they are looked at: most are out of reach of all obstacles.
   void place_all() const;
   void place(int node, const Vec<2>& line, Position& point) const {
@@ -197,6 +206,11 @@ class ContactProblem {
   Robot robot_;
   Model model_;
   std::span<const Obstacle> obstacles_;
+  std::span<const Obstacle> origins_, towards_;  // of moving obstacles: where they come from and go to
+  std::span<const double> motions_;
+  double largest_motion_ = 0;
+  double part_ = 0;                // of the way, where they are
+  std::vector<Obstacle> passing_;  // there
   double farthest_line_ = 0;  // distance of a line of points from the backbone
   double reach_ = 0;          // distance of a node from an obstacle within which its points are measured
   double energy_ = 0;

@@ -47,7 +47,12 @@ class Continuation {
   // writes the equilibrium reached to another block, which may be the same. Writes nothing where it is interrupted.
   virtual StepResult follow(const double* from, const double* target, double* to) = 0;
 
-  // The same, appending every accepted shape to `shapes`: three numbers of each node, the points that can touch, and
+  // The same while the obstacles move evenly to others of the same kinds, as far as they can; `result.scene` says how
+  // far. `motions` bounds the motion of the surface of each [mm]. Ends among the obstacles of `set_obstacles`.
+  virtual StepResult move(const double* from, const double* target, std::span<const Obstacle<D>> towards,
+                          std::span<const double> motions, double* to) = 0;
+
+  // The same as `follow`, appending every accepted shape to `shapes`: three numbers of each node, the points that can touch, and
   // the displacements of the obstacles.
   virtual StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) = 0;
 

@@ -69,6 +69,7 @@ double ModelContinuation<Model>::command_distance(const Command& a, const Comman
   double farthest = 0;
   for (int k = 0; k < kCables; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
   farthest = std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
+  farthest = std::max(farthest, kMotion * problem_.obstacle_motion(a.scene, b.scene) / robot.max_length);
   return std::max(farthest, kLoading * std::abs(a.loads - b.loads));
 }
 
@@ -94,7 +95,7 @@ bool ModelContinuation<Model>::pulls_cable(const Command& command) const {
 template <class Model>
 bool ModelContinuation<Model>::only_releases(const Command& command) const {
   return !pulls_cable(command) && command.length == present_.command.length &&
-         command.loads == present_.command.loads && !(command == present_.command);
+         command.loads == present_.command.loads && !moves_obstacles(command) && !(command == present_.command);
 }
 
 template <class Model>
@@ -169,7 +170,8 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
     } else {
       pursuit.yielding = kYield;
     }
-    const Command goal = raise_to_pretension(pursuit.wanted);
+    Command goal = raise_to_pretension(pursuit.wanted);
+    if (highest(tensions_) > limit) goal.scene = present_.command.scene;  // obstacles wait until the motors hold
     const double remaining = command_distance(present_.command, goal);
     if (remaining == 0 && resume(pursuit)) continue;
     if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;
@@ -195,10 +197,15 @@ template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
   double& step = pursuit.step;
   bool stalled =
-      layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) && goal.length == present_.command.length;
+      layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) &&
+      goal.length == present_.command.length && !moves_obstacles(goal);
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
   const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
-  const Move move = stalled ? Move::kOverTension : try_command(next);
+  Move move = stalled ? Move::kOverTension : try_command(next);
+  if (move == Move::kOverTension && moves_obstacles(next)) {
+    if (layout_.cables.size == 1) return give_way(pursuit, next, size);
+    move = Move::kAccepted;  // what the motors cannot hold then, they let out
+  }
   if (move == Move::kAccepted) {
     accept();
     step = pursuit.refined ? size : std::min(2 * size, kLargestStep);
@@ -218,7 +225,8 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   } else {
     const End end = descend_from_end(next);
     if (end == End::kStuck) {
-      pursuit.reached = is_blocked(next) ? Status::kBlocked : Status::kGaveUp;
+      const bool stopped = is_blocked(next) || (moves_obstacles(next) && result_.reason == Reason::kStuck);
+      pursuit.reached = stopped ? Status::kBlocked : Status::kGaveUp;
       return false;
     }
     stalled = end == End::kOverTension;
@@ -231,6 +239,19 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   if (!hold_stalled_cables(pursuit.wanted)) return false;
   clear_trend();
   return true;
+}
+
+// One sub-step in which obstacles press so much that the motor has to let the cable out; false where they cannot go on.
+template <class Model>
+bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, double size) {
+  if (pay_out(next)) {
+    pursuit.step = size;
+  } else {
+    pursuit.step = size / 2;
+    pursuit.refined = true;
+    if (size <= kSmallestStep) pursuit.reached = Status::kBlocked;
+  }
+  return pursuit.reached != Status::kBlocked;
 }
 
 template <class Model>
@@ -250,8 +271,10 @@ StepResult ModelContinuation<Model>::follow(const double* from, const double* ta
   }
   result_.status = pursue(wanted);
   finish(start, to);
-  if (result_.status == Status::kGaveUp && !std::isfinite(problem_.objective()) && to != from)
-    std::copy_n(from, layout_.size, to);
+  if (result_.status == Status::kGaveUp && !std::isfinite(problem_.objective())) {
+    result_.scene = start.scene;
+    if (to != from) std::copy_n(from, layout_.size, to);
+  }
   return result_;
 }
 
@@ -274,6 +297,7 @@ StepResult ModelContinuation<Model>::finish(const Command& start, double* to) {
   }
   evaluate_present();
   result_.factorizations = static_cast<int>(newton_.factorizations() - factorizations_before_);
+  result_.scene = present_.command.scene;
   if (std::isfinite(problem_.objective()))
     write_block(to);
   else

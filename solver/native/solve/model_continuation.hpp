@@ -1,6 +1,7 @@
 // The continuation compiled for one model. Its files: block_io (blocks read and written), model_continuation (a branch
 // followed), trend (how it goes on), rest (where it begins), acceptance (whether a shape continues the branch), passage
-// (whether the robot passed through an obstacle), tension_limit (stalls and yielding motors), conflict (cables that
+// (whether the robot passed through an obstacle), motion (obstacles that move), tension_limit (stalls and
+// yielding motors), conflict (cables that
 // pull against each other), descent (what happens after the end of a branch), ramp (whether a pull reaches a force).
 #pragma once
 
@@ -45,6 +46,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   void set_interruption(Interruption interruption) override { interruption_ = std::move(interruption); }
   StepResult rest(double length, double* to) override;
   StepResult follow(const double* from, const double* target, double* to) override;
+  StepResult move(const double* from, const double* target, std::span<const Obstacle<kSpace>> towards,
+                  std::span<const double> motions, double* to) override;
   StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) override;
   bool ramp_reaches_force(const Ramp& ramp, double* reached) override;
   Optimality optimality(const double* block) override;
@@ -71,6 +74,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Status pursue(const Command& target);
   bool resume(Pursuit& pursuit) const;
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
+  bool give_way(Pursuit& pursuit, const Command& next, double size);
   Command raise_to_pretension(Command wanted) const;
   Move try_command(const Command& command);
   void accept();
@@ -89,6 +93,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   double travel(const Command& from, const Command& to) const;
   bool pulls_cable(const Command& command) const;
   bool only_releases(const Command& command) const;
+  bool moves_obstacles(const Command& command) const { return command.scene != present_.command.scene; }
   bool work_is_spent() const {
     return result_.interrupted || newton_.factorizations() - factorizations_before_ > tolerances::kWork;
   }
@@ -121,6 +126,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool is_at_tension_limit() const;
   bool is_tight() const;
   bool approach_tension_limit();
+  bool pay_out(const Command& command);
   bool hold_stalled_cables(Command& wanted) const;
   bool yield_cables(Command& wanted, double least) const;
   bool is_unyielding() const;
@@ -193,6 +199,7 @@ Command<C> between(const Command<C>& a, const Command<C>& b, double t) {
   for (int k = 0; k < C; ++k) out.cables[k] = a.cables[k] + t * (b.cables[k] - a.cables[k]);
   out.length = a.length + t * (b.length - a.length);
   out.loads = a.loads + t * (b.loads - a.loads);
+  out.scene = a.scene + t * (b.scene - a.scene);
   return out;
 }
 

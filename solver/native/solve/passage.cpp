@@ -8,7 +8,7 @@
 
 namespace ccr {
 
-// Bound on the motion of any point relative to any mount since the last accepted shape [mm].
+// Bound on the motion of any point relative to any obstacle since the last accepted shape [mm].
 template <class Model>
 double ModelContinuation<Model>::largest_motion() const {
   double of_points = 0, of_mounts = 0;  // squared
@@ -21,7 +21,8 @@ double ModelContinuation<Model>::largest_motion() const {
     const Position move = minus(trial_.mounts[m], mounts_[m]);
     of_mounts = std::max(of_mounts, dot(move, move));
   }
-  return std::sqrt(of_points) + std::sqrt(of_mounts);
+  return std::sqrt(of_points) + std::sqrt(of_mounts) +
+         problem_.obstacle_motion(present_.command.scene, trial_.command.scene);
 }
 
 template <class Model>
@@ -37,14 +38,16 @@ bool ModelContinuation<Model>::passage_is_clear(double moved) const {
   return true;
 }
 
-// Sweeps the points and edges of the robot past one obstacle, in the frame of its mount.
+// Sweeps the points and edges of the robot past one obstacle, in its frame where it is now.
 template <class Model>
 bool ModelContinuation<Model>::passage_is_clear(int j, double moved) const {
   const Robot& robot = problem_.robot();
   const auto& obstacle = problem_.obstacles()[j];
   const double* gaps = problem_.gaps().data() + j * points_.size();
   const int mount = problem_.mount_of(j);
-  const Position before = mount < 0 ? Position{} : mounts_[mount], now = mount < 0 ? Position{} : trial_.mounts[mount];
+  const Position now = mount < 0 ? Position{} : trial_.mounts[mount];
+  Position before = mount < 0 ? Position{} : mounts_[mount];
+  before += problem_.displacement(j, trial_.command.scene, present_.command.scene);
   const double path = harmless_path(obstacle);
   const auto from = [&](int k) { return minus(points_[k], before); };
   const auto to = [&](int k) { return minus(problem_.points()[k], now); };

@@ -16,6 +16,7 @@ struct StepResult {
   int iterations = 0;        // of Newton's method
   int factorizations = 0;    // of the KKT system
   bool interrupted = false;  // amid the step, which wrote nothing then
+  double scene = 1;          // part of their way that moving obstacles have gone
 };
 
 // Residuals of the KKT conditions, without units: the largest slope of the Lagrangian in a control [rad²], the largest
