@@ -27,9 +27,9 @@ def generate(name: str, functions: list[ca.Function], directory: Path) -> None:
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     in_space = [spatial.closure_function(), spatial.bend_function(), spatial.hessian_contraction_function()]
-    of_rods = [arc_function(), arc.arc_function(), arc.arc_hessian_function()]
-    of_rods += [arc.cable_function(), arc.cable_hessian_function()]
-    generate("segment_laws", [segment_function(), *of_rods, *in_space], folder)
+    of_arcs = [arc.arc_function(), arc.arc_hessian_function(), arc.cable_function(), arc.cable_hessian_function()]
+    generate("segment_laws", [segment_function(), arc_function(), *in_space], folder)
+    generate("arc_laws", of_arcs, folder)
     generate("disk_laws", [disk_gap_function()], folder)
     kinds = (*GAP_LAWS, *spatial.GAP_LAWS)
     generate("gap_laws", [function(law) for law in kinds for function in (gap_function, clearance_function)], folder)

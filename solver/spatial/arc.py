@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-SERIES_TERMS = 9  # of the power series of q(t/4), to the last digit for t up to π
+SERIES_TERMS = 9  # of the power series of Stumpff's functions, to the last digit for t up to π
 
 
 class Shared(NamedTuple):
@@ -37,40 +37,40 @@ NUMBERS = 11  # of Shared
 def shared_values(control: ca.SX, length: ca.SX) -> Shared:
     """Return c, g, p and q of a segment, with their slopes.
 
-    With h = t/4 and s = h², all follow from ``q(h)`` without cancellation: ``S = sinc h = 1 − s q(h)``,
-    ``C = cos h = S + 2 s dS/ds``, g = S C, p = S²/8 and ``q = (q(h) + S K)/16 + g p``, where
-    ``K = (1 − C)/s = 3 q(h) + 2 s dq(h)/ds``.
+    All follow from Stumpff's functions of half the angle, h = t/2, without cancellation: g = c1, p = c2/4 and
+    ``q = (c3 + c1 c2)/4``.
     """
-    chord = _spread(*_quarter(ca.sumsqr(control[:2]) / 16)[1:])
-    quarter = ca.sumsqr(control) / 16
-    (turn, turn1, turn2), sinc, cosine = _quarter(quarter)
-    spread, lean = _spread(sinc, cosine), (sinc[0] ** 2 / 8, sinc[0] * sinc[1] / 64)
-    fall, fall1 = 3 * turn + 2 * quarter * turn1, 5 * turn1 + 2 * quarter * turn2
-    half1 = turn1 + sinc[1] * fall + sinc[0] * fall1
+    along, along1, along2 = _stumpff(ca.sumsqr(control[:2]) / 4)[0]
+    (g, g1, g2), (p, p1, p2), (turn, turn1) = _stumpff(ca.sumsqr(control) / 4)
     return Shared(
-        (length * chord[0], length * chord[1], length * chord[2]),
-        spread,
-        (*lean, (sinc[1] ** 2 + sinc[0] * sinc[2]) / 1024),
-        ((turn + sinc[0] * fall) / 16 + spread[0] * lean[0], half1 / 256 + spread[1] * lean[0] + spread[0] * lean[1]),
+        (length * along, length / 4 * along1, length / 16 * along2),
+        (g, g1 / 4, g2 / 16),
+        (p / 4, p1 / 16, p2 / 64),
+        ((turn + g * p) / 4, (turn1 + g1 * p + g * p1) / 16),
     )
 
 
-def _quarter(square: ca.SX) -> tuple[tuple[ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX, ca.SX], ca.SX]:
-    """Return q and sinc of h with two slopes each in ``square = h²``, and cos h."""
-    value = slope = half_curvature = ca.SX(0)
+_Slopes = tuple[ca.SX, ca.SX, ca.SX]
+
+
+def _stumpff(square: ca.SX) -> tuple[_Slopes, _Slopes, tuple[ca.SX, ca.SX]]:
+    """Return c1 = sin h / h, c2 = (1 − cos h)/h² and c3 = (1 − c1)/h², with slopes in ``square = h²``.
+
+    Two power series give c5 and c6; ``c[k] = 1/k! − h² c[k+2]`` the others, and ``dc[k]/dh² = (k c[k+2] − c[k+1])/2``
+    their slopes.
+    """
+    c5, c6 = (_series(square, k) for k in (5, 6))
+    c4, c3 = (1 / math.factorial(k) - square * above for k, above in ((4, c6), (3, c5)))
+    c2, c1 = (1 / math.factorial(k) - square * above for k, above in ((2, c4), (1, c3)))
+    slope2, slope3, slope4 = c4 - c3 / 2, (3 * c5 - c4) / 2, 2 * c6 - c5 / 2
+    return (c1, (c3 - c2) / 2, (slope3 - slope2) / 2), (c2, slope2, slope4 - slope3 / 2), (c3, slope3)
+
+
+def _series(square: ca.SX, order: int) -> ca.SX:
+    value = ca.SX(0)
     for k in reversed(range(SERIES_TERMS)):
-        half_curvature = slope + square * half_curvature
-        slope = value + square * slope
-        value = (-1) ** k / math.factorial(2 * k + 3) + square * value
-    sinc, sinc1 = 1 - square * value, -value - square * slope
-    sinc2 = -2 * slope - 2 * square * half_curvature
-    return (value, slope, 2 * half_curvature), (sinc, sinc1, sinc2), sinc + 2 * square * sinc1
-
-
-def _spread(sinc: tuple[ca.SX, ca.SX, ca.SX], cosine: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return sinc(2h) with its slopes in 16 h², from sinc and cosine of h."""
-    value, slope, curvature = sinc
-    return value * cosine, (slope * cosine - value**2 / 2) / 16, (curvature * cosine - 1.5 * value * slope) / 256
+        value = (-1) ** k / math.factorial(2 * k + order) + square * value
+    return value
 
 
 def _symbols() -> tuple[ca.SX, Shared]:
@@ -81,7 +81,7 @@ def _symbols() -> tuple[ca.SX, Shared]:
 
 
 def arc_function() -> ca.Function:
-    """Return ``(u, l0) → chord, rotation``, their slopes, row by row, and the :class:`Shared` values, ``(41,)``.
+    """Return ``(u, l0) → chord, rotation and their slopes, row by row, (30,), and the Shared values, (11,)``.
 
     The slopes are those of the chord and of the upper disk's rotation, all in the frame of the lower disk.
     """
@@ -89,22 +89,26 @@ def arc_function() -> ca.Function:
     shared = shared_values(control, length)
     (c, c1, _), (g, g1, _), (p, p1, _), (q, _) = shared
     x, y, z = ca.vertsplit(control)
-    square, up, cross = ca.sumsqr(control), ca.vertcat(0, 0, 1), ca.skew(control)
-    aside, across = ca.vertcat(y, -x, 0), ca.vertcat(ca.horzcat(0, 1, 0), ca.horzcat(-1, 0, 0), ca.horzcat(0, 0, 0))
-    tangent = p * z * control + g / 2 * aside + (1 - p * square) * up
-    slope = 2 * p1 * z * control + g1 * aside - 2 * (p1 * square + p) * up
-    tangent_slope = slope @ control.T + p * (z * ca.SX.eye(3) + control @ up.T) + g / 2 * across
-    chord_slope = c * tangent_slope + 2 * c1 * tangent @ ca.vertcat(x, y, 0).T
-    half_cosine, twice = g + 2 * square * g1, cross @ cross
-    rotation = ca.SX.eye(3) + g * half_cosine * cross + g**2 / 2 * twice
-    turning = ca.SX.eye(3) + g**2 / 2 * cross + q * twice
+    square, one, cross, products = ca.sumsqr(control), ca.SX.eye(3), ca.skew(control), control @ control.T
+    fall = 1 - p * square
+    tangent = ca.vertcat(p * z * x + g / 2 * y, p * z * y - g / 2 * x, p * z * z + fall)
+    lean, swing = c * p, c * g / 2
+    slope = ca.vertcat(2 * p1 * z * x + g1 * y, 2 * p1 * z * y - g1 * x, 2 * p1 * z * z - 2 * (p1 * square + p))
+    slope, shortening = c * slope, 2 * c1 * tangent
+    chord_slope = ca.horzcat((slope + shortening) * x, (slope + shortening) * y, slope * z + lean * control)
+    chord_slope += ca.diag(ca.vertcat(*[lean * z] * 3))
+    chord_slope[0, 1] += swing
+    chord_slope[1, 0] -= swing
+    halves = g**2 / 2
+    rotation = (1 - halves * square) * one + g * fall * cross + halves * products
+    turning = (1 - q * square) * one + halves * cross + q * products
     parts = [ca.vec(part.T) for part in (rotation, chord_slope, turning)]
-    law = ca.vertcat(c * tangent, *parts, *(value for values in shared for value in values))
-    return ca.Function("ccr_spatial_arc", [control, length], [ca.cse(ca.densify(law))])
+    law = ca.vertcat(c * tangent, *parts), ca.vertcat(*(value for values in shared for value in values))
+    return ca.Function("ccr_spatial_arc", [control, length], ca.cse([ca.densify(part) for part in law]))
 
 
 def arc_hessian_function() -> ca.Function:
-    """Return ``(u, shared, force, moment) → Hessian in the control, row by row``, ``(9,)``.
+    """Return ``(u, shared, force, moment) → Hessian in the control``, its lower triangle row by row, ``(6,)``.
 
     It is that of the work of a force on the chord and of a moment on the rotation of the upper disk, in the frame of
     the lower one; the moment's is symmetrised.
@@ -114,66 +118,69 @@ def arc_hessian_function() -> ca.Function:
     x, y, z = ca.vertsplit(control)
     square, bent, up, one = ca.sumsqr(control), ca.vertcat(x, y, 0), ca.vertcat(0, 0, 1), ca.SX.eye(3)
     # The force's work over c is p a + g/2 b + f_z.
-    a, b = z * ca.dot(force, control) - force[2] * square, force[0] * y - force[1] * x
-    a_slope = force * z + up * ca.dot(force, control) - 2 * force[2] * control
+    pull, along = ca.dot(force, control), ca.dot(control, moment)
+    a, b = z * pull - force[2] * square, force[0] * y - force[1] * x
+    a_slope = force * z + up * pull - 2 * force[2] * control
     b_slope = ca.vertcat(-force[1], force[0], 0)
-    curved = 4 * (p2 * a + g2 / 2 * b) * control @ control.T + 2 * (p1 * a + g1 / 2 * b - p * force[2]) * one
-    curved += _both(control, 2 * p1 * a_slope + g1 * b_slope) + p * _both(force, up)
     work = p * a + g / 2 * b + force[2]
-    slope = (2 * p1 * a + g1 * b) * control + p * a_slope + g / 2 * b_slope
-    hessian = c * curved + 2 * c1 * _both(bent, slope)
-    hessian += work * (2 * c1 * ca.diag(ca.vertcat(1, 1, 0)) + 4 * c2 * bent @ bent.T)
-    along = ca.dot(control, moment)
+    rise, curl = 2 * p1 * a + g1 * b, 2 * (p2 * a + g2 / 2 * b)
+    sloped = c * (2 * p1 * a_slope + g1 * b_slope + curl * control)
     turned = q1 * (control * along - square * moment) - g * g1 * ca.cross(control, moment) - q / 2 * moment
-    hessian += _both(turned, control) + q * along * one
-    law = ca.densify(ca.vec(hessian))
-    return ca.Function("ccr_spatial_arc_hessian", [control, numbers, force, moment], [ca.cse(law)])
+    slope = 2 * c1 * (rise * control + p * a_slope + g / 2 * b_slope) + 2 * c2 * work * bent
+    hessian = _both(control, sloped + turned) + _both(bent, slope) + c * p * _both(force, up)
+    hessian += (c * (rise - 2 * p * force[2]) + q * along) * one + 2 * c1 * work * ca.diag(ca.vertcat(1, 1, 0))
+    return ca.Function("ccr_spatial_arc_hessian", [control, numbers, force, moment], [ca.cse(_triangle(hessian))])
 
 
 def cable_function() -> ca.Function:
-    """Return ``(u, l0, hole, shared) → taken, its slope``: what a segment takes up from a cable [mm], ``(4,)``.
+    """Return ``(u, hole, shared) → distance and its slope``, of the holes of a cable in both disks [mm], ``(4,)``.
 
-    It is l0 less the distance of the holes.
+    A hole is its two coordinates and its distance from the backbone.
     """
-    control, length, hole = ca.SX.sym("control", 3), ca.SX.sym("length"), ca.SX.sym("hole", 2)
+    control, hole = ca.SX.sym("control", 3), ca.SX.sym("hole", 3)
     numbers, shared = _symbols()
     ahead, aside, ahead_slope, aside_slope = _cable(control, hole, shared)
-    size = ca.sqrt(ahead**2 + aside**2)
-    slope = (ahead * ahead_slope + aside * aside_slope) / size
-    return ca.Function(
-        "ccr_spatial_cable", [control, length, hole, numbers], [ca.cse(ca.vertcat(length - size, -slope))]
-    )
+    size = ca.sqrt(ahead**2 + (hole[2] * aside) ** 2)
+    per_size = 1 / size
+    slope = ahead * per_size * ahead_slope + hole[2] ** 2 * aside * per_size * aside_slope
+    return ca.Function("ccr_spatial_cable", [control, hole, numbers], [ca.cse(ca.vertcat(size, slope))])
 
 
 def cable_hessian_function() -> ca.Function:
-    """Return ``(u, hole, shared) → Hessian, row by row``, of what a segment takes up from a cable [mm], ``(9,)``."""
-    control, hole = ca.SX.sym("control", 3), ca.SX.sym("hole", 2)
+    """Return ``(u, hole, shared) → Hessian of that distance``, its lower triangle row by row, ``(6,)``."""
+    control, hole = ca.SX.sym("control", 3), ca.SX.sym("hole", 3)
     numbers, shared = _symbols()
     (_, c1, c2), (_, g1, g2), *_ = shared
     ahead, aside, ahead_slope, aside_slope = _cable(control, hole, shared)
-    bent, along, one = ca.vertcat(control[:2], 0), ca.vertcat(0, 0, 1), ca.SX.eye(3)
-    spread_hessian = 2 * g1 * one + 4 * g2 * control @ control.T
-    towards, offset = ca.vertcat(hole[1], -hole[0], 0), ca.sqrt(ca.sumsqr(hole))
+    bent, one = ca.vertcat(control[:2], 0), ca.SX.eye(3)
     chord_hessian = 2 * c1 * ca.diag(ca.vertcat(1, 1, 0)) + 4 * c2 * bent @ bent.T
-    ahead_hessian = chord_hessian + spread_hessian * ca.dot(control, towards) + 2 * g1 * _both(control, towards)
-    aside_hessian = offset * (spread_hessian * control[2] + 2 * g1 * _both(control, along))
-    size = ca.sqrt(ahead**2 + aside**2)
-    slope = (ahead * ahead_slope + aside * aside_slope) / size
-    hessian = ahead * ahead_hessian + aside * aside_hessian + ahead_slope @ ahead_slope.T + aside_slope @ aside_slope.T
-    law = ca.densify(-ca.vec(hessian - slope @ slope.T) / size)
-    return ca.Function("ccr_spatial_cable_hessian", [control, hole, numbers], [ca.cse(law)])
+    spread_hessian = 2 * g1 * one + 4 * g2 * control @ control.T
+    across = ca.vertcat(ahead * hole[1], -ahead * hole[0], hole[2] ** 2 * aside)
+    per_size = 1 / ca.sqrt(ahead**2 + (hole[2] * aside) ** 2)
+    # The distance is that of two coordinates, which turns as they change.
+    turning = hole[2] * per_size * (aside * ahead_slope - ahead * aside_slope)
+    hessian = ahead * chord_hessian + ca.dot(control, across) * spread_hessian + _both(2 * g1 * control, across)
+    hessian = per_size * (hessian + turning @ turning.T)
+    return ca.Function("ccr_spatial_cable_hessian", [control, hole, numbers], [ca.cse(_triangle(hessian))])
 
 
 def _cable(control: ca.SX, hole: ca.SX, shared: Shared) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return how far a cable runs ahead in the frame halfway, and by the twist aside, with their slopes."""
+    """Return how far a cable runs ahead in the frame halfway, and by the twist aside, with their slopes.
+
+    The way aside is that per distance from the backbone, the same for all cables.
+    """
     (c, c1, _), (g, g1, _), *_ = shared
-    towards, offset, twist = ca.vertcat(hole[1], -hole[0], 0), ca.sqrt(ca.sumsqr(hole)), control[2]
-    moved = ca.dot(control, towards)
-    ahead_slope = 2 * c1 * ca.vertcat(control[:2], 0) + 2 * g1 * moved * control + g * towards
-    aside_slope = offset * (2 * g1 * twist * control + g * ca.vertcat(0, 0, 1))
-    return c + g * moved, offset * g * twist, ahead_slope, aside_slope
+    towards, twist, spreading = ca.vertcat(hole[1], -hole[0], 0), control[2], 2 * g1 * control
+    moved = control[0] * hole[1] - control[1] * hole[0]
+    ahead_slope = 2 * c1 * ca.vertcat(control[:2], 0) + spreading * moved + g * towards
+    return c + g * moved, g * twist, ahead_slope, spreading * twist + g * ca.vertcat(0, 0, 1)
 
 
 def _both(a: ca.SX, b: ca.SX | ca.DM) -> ca.SX:
     """Return ``a bᵀ + b aᵀ``."""
     return a @ b.T + b @ a.T
+
+
+def _triangle(matrix: ca.SX) -> ca.SX:
+    """Return the lower triangle of a matrix, row by row."""
+    return ca.densify(ca.vertcat(*(matrix[row, column] for row in range(3) for column in range(row + 1))))

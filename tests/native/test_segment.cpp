@@ -5,6 +5,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "differences.hpp"
 #include "math/rotations.hpp"
 #include "model/segment.hpp"
 #include "random.hpp"
@@ -25,12 +26,6 @@ CCR_DECLARE(avx2)
 
 namespace testing {
 namespace {
-
-constexpr double kScales[] = {1e-3, 1, 1e3};  // of a robot with segments of 10 mm and cables 8 mm off the backbone
-constexpr double kDifference = 1e-5;          // of a coordinate, for central differences
-constexpr double kClose = 1e-8;               // error of the differences, relative to derivatives of about one
-
-bool near(double a, double b, double scale) { return std::abs(a - b) <= kClose * scale; }
 
 PaperLaw::Bend paper(double sine, double pull, double scale) {
   PaperLaw::Bends bends(1);
@@ -178,133 +173,6 @@ Vec<3> slope(const InSpace& bend, const Vec<3>& force, const Vec<3>& moment) {
   return out;
 }
 
-// Small rotation between two rotations that are close.
-Vec<3> turn(const Mat<3, 3>& from, const Mat<3, 3>& to) {
-  Mat<3, 3> between;
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c)
-      for (int k = 0; k < 3; ++k) between(r, c) += to(r, k) * from(c, k);
-  return {
-      {(between(2, 1) - between(1, 2)) / 2, (between(0, 2) - between(2, 0)) / 2, (between(1, 0) - between(0, 1)) / 2}};
-}
-
-// A segment of the rod in space, and what its law says.
-struct Arc {
-  Vec<3> chord;
-  Mat<3, 3> rotation, chord_slope, turn_slope;
-  double shared[SpatialArcLaw::kShared];
-};
-static_assert(sizeof(Arc) == SpatialArcLaw::kBend * sizeof(double));
-
-struct Arcs {
-  Arcs(const Vec<3>& control, double scale)
-      : length(10 * scale), controls(SpatialArcLaw::kControl, 1), bends(SpatialArcLaw::kBend, 1) {
-    controls.put(0, control.v.data(), 3);
-    SpatialArcLaw::bend(1, length, controls, bends);
-    bends.get(0, at.chord.v.data(), SpatialArcLaw::kBend);
-  }
-
-  // Length taken up from a cable, its slope and its Hessian.
-  std::array<double, 13> take(const Vec<2>& hole) const {
-    Rows cable(SpatialArcLaw::kCable, 1), hessian(SpatialArcLaw::kHessian, 1);
-    SpatialArcLaw::take(1, length, hole.v.data(), controls, bends, cable);
-    SpatialArcLaw::cable_hessian(1, hole.v.data(), controls, bends, hessian);
-    std::array<double, 13> out;
-    cable.get(0, out.data(), SpatialArcLaw::kCable);
-    hessian.get(0, out.data() + SpatialArcLaw::kCable, SpatialArcLaw::kHessian);
-    return out;
-  }
-  Mat<3, 3> hessian_contraction(const Vec<3>& force, const Vec<3>& moment) const {
-    Rows adjoints(SpatialArcLaw::kAdjoint, 1), hessians(SpatialArcLaw::kHessian, 1);
-    adjoints.put(0, force.v.data(), 3);
-    adjoints.put(0, moment.v.data(), 3, 3);
-    SpatialArcLaw::hessian_contraction(1, controls, bends, adjoints, hessians);
-    Mat<3, 3> out;
-    hessians.get(0, out.v.data(), SpatialArcLaw::kHessian);
-    return out;
-  }
-
-  double length;
-  Rows controls, bends;
-  Arc at;
-};
-
-// Rotates a vector by a rotation vector (Rodrigues).
-Vec<3> rotated(const Vec<3>& by, const Vec<3>& v) {
-  const double angle = norm(by);
-  if (angle == 0) return v;
-  Vec<3> axis = by;
-  for (double& part : axis.v) part /= angle;
-  const Vec<3> across = cross(axis, v);
-  Vec<3> out;
-  for (int k = 0; k < 3; ++k)
-    out[k] = v[k] * std::cos(angle) + across[k] * std::sin(angle) + axis[k] * dot(axis, v) * (1 - std::cos(angle));
-  return out;
-}
-
-std::vector<Vec<3>> rotation_vectors() {
-  Random random(3);
-  std::vector<Vec<3>> out = {{}, {{1e-7, 0, 0}}, {{0, 0, 0.5}}, {{0, 3.0, 0}}};
-  for (int k = 0; k < 20; ++k) out.push_back(random.matrix<3>(k % 2 ? 0.2 : 1.5));
-  return out;
-}
-
-TEST_CASE("a segment of the rod in space is an arc, and takes the cable by which its holes come closer") {
-  for (const double scale : kScales)
-    for (const Vec<3>& control : rotation_vectors()) {
-      const Arcs arc(control, scale);
-      const double half = std::hypot(control[0], control[1]) / 2;
-      const double chord = arc.length * (half == 0 ? 1 : std::sin(half) / half);
-      const Vec<3> tangent = rotated({{control[0] / 2, control[1] / 2, control[2] / 2}}, {{0, 0, chord}});
-      CHECK(norm(minus(arc.at.chord, tangent)) <= 1e-13 * arc.length);
-      for (const Vec<2>& place : {Vec<2>{{8 * scale, 0}}, Vec<2>{{-3 * scale, 5 * scale}}}) {
-        const Vec<3> hole = {{place[0], place[1], 0}};
-        const Vec<3> turned = times(arc.at.rotation, hole);
-        CHECK(norm(minus(turned, rotated(control, hole))) <= 1e-13 * norm(hole));
-        Vec<3> way = turned;
-        way += tangent;
-        way -= hole;
-        CHECK(std::abs(arc.length - norm(way) - arc.take(place)[0]) <= 1e-13 * arc.length);
-      }
-    }
-}
-
-TEST_CASE("the slopes of a segment of the rod in space are those of its shape") {
-  const double h = kDifference;
-  Random random(4);
-  for (const double scale : kScales)
-    for (const Vec<3>& control : rotation_vectors()) {
-      const Arcs arc(control, scale);
-      const Vec<2> hole = {{6 * scale, -5 * scale}};
-      const Vec<3> force = random.matrix<3>(1 / scale), moment = random.matrix<3>();
-      const auto slope = [&](const Arcs& there) {
-        Vec<3> out = transpose_times(there.at.chord_slope, force);
-        out += transpose_times(there.at.turn_slope, moment);
-        return out;
-      };
-      Mat<3, 3> curved;
-      for (int k = 0; k < 3; ++k) {
-        Vec<3> up = control, down = control;
-        up[k] += h;
-        down[k] -= h;
-        const Arcs more(up, scale), less(down, scale);
-        const Vec<3> moved = minus(more.at.chord, less.at.chord), around = turn(less.at.rotation, more.at.rotation);
-        const Vec<3> steeper = minus(slope(more), slope(less));
-        const auto taken = arc.take(hole), taken_more = more.take(hole), taken_less = less.take(hole);
-        CHECK(near(taken[1 + k], (taken_more[0] - taken_less[0]) / (2 * h), 10 * scale));
-        for (int r = 0; r < 3; ++r) {
-          CHECK(near(arc.at.chord_slope(r, k), moved[r] / (2 * h), 10 * scale));
-          CHECK(near(arc.at.turn_slope(r, k), around[r] / (2 * h), 1));
-          CHECK(near(taken[4 + 3 * r + k], (taken_more[1 + r] - taken_less[1 + r]) / (2 * h), 20 * scale));
-          curved(r, k) = steeper[r] / (2 * h);
-        }
-      }
-      const Mat<3, 3> found = arc.hessian_contraction(force, moment);  // the symmetric part
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) CHECK(near(found(r, c), (curved(r, c) + curved(c, r)) / 2, 30));
-    }
-}
-
 struct Case {
   Vec<3> control;
   Vec<2> displacements;
@@ -403,12 +271,6 @@ TEST_CASE("cables that cannot have their lengths are refused") {
 }
 
 #ifdef CCR_AVX2
-
-bool same_bits(const Rows& a, const Rows& b, int numbers, int segments) {
-  for (int k = 0; k < numbers; ++k)
-    if (std::memcmp(a.row(k), b.row(k), static_cast<std::size_t>(segments) * sizeof(double)) != 0) return false;
-  return true;
-}
 
 TEST_CASE("AVX2 gives the same bits" * doctest::skip(!__builtin_cpu_supports("avx2"))) {
   Random random(3);

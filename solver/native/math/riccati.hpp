@@ -88,7 +88,6 @@ class Riccati {
   // Solves for several right-hand sides: H⁻¹ times the forces, or -H⁻¹ times the gradient. Follows a factor that
   // returned true.
   void respond(std::span<const Load> loads) {
-    for (; NX > 3 && loads.size() >= 4; loads = loads.subspan(4)) sweep<4>(loads.data());
     for (; loads.size() >= 2; loads = loads.subspan(2)) sweep<2>(loads.data());
     if (!loads.empty()) sweep<1>(loads.data());
   }

@@ -3,11 +3,17 @@
 
 #include <cmath>
 
+#include "math/rows.hpp"
+
+#ifndef CCR_LANES
+#define CCR_LANES 4
+#endif
+
 namespace ccr::CCR_SIMD {
 namespace {
 
 struct Lanes {
-  static constexpr int kWidth = 4;
+  static constexpr int kWidth = CCR_LANES;
 #if defined(__GNUC__)
   typedef double Vector __attribute__((vector_size(8 * kWidth)));
 #else
@@ -61,6 +67,17 @@ inline Lanes asin(Lanes a) {
     angle = steep ? 1.57079632679489661923 - 2.0 * (root + root * rest) : angle;
   }
   return {a.v < 0.0 ? -angle : angle};
+}
+
+// Numbers of as many segments as there are lanes, from `first` on.
+template <int N>
+void read(const Rows& rows, int first, Lanes (&lanes)[N], int from = 0) {
+  for (int k = 0; k < N; ++k) __builtin_memcpy(&lanes[k].v, rows.row(from + k) + first, sizeof lanes[k].v);
+}
+
+template <int N>
+void write(const Lanes (&lanes)[N], int first, Rows& rows) {
+  for (int k = 0; k < N; ++k) __builtin_memcpy(rows.row(k) + first, &lanes[k].v, sizeof lanes[k].v);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "math/rows.hpp"
 #include "model/robot.hpp"
 
 namespace ccr {
@@ -14,7 +15,7 @@ class RodCables {
   using Control = Vec<U>;
 
   RodCables(const std::vector<Cable>& cables, int segments)
-      : cables_(cables), minus_slopes_(cables.size(), std::vector<Control>(segments)) {}
+      : cables_(cables), minus_slopes_(cables.size(), std::vector<Control>(Rows::room(segments))) {}
 
   int count() const { return static_cast<int>(cables_.size()); }
   const Cable& operator[](int cable) const { return cables_[cable]; }
@@ -29,6 +30,10 @@ class RodCables {
     taken_[cable] += taken;
     for (int k = 0; k < U; ++k) minus_slopes_[cable][segment][k] = -slope[k];
   }
+
+  // The same for all segments of a cable, whose slopes have been written.
+  void set_taken(int cable, double taken) { taken_[cable] = taken; }
+  Control* minus_slopes(int cable) { return minus_slopes_[cable].data(); }
 
   // Length taken up by the bending beyond the displacement [mm], and minus its gradient in the controls.
   double slack(int cable, double displacement) const { return taken_[cable] - displacement; }

@@ -2,32 +2,10 @@
 #pragma once
 
 #include <utility>
-#include <vector>
+
+#include "math/rows.hpp"
 
 namespace ccr {
-
-// Numbers of all segments, one row for each number, so that the laws read and write several segments at a time.
-class Rows {
- public:
-  Rows(int numbers, int segments)
-      : stride_((segments + kPadding - 1) / kPadding * kPadding), values_(numbers * stride_) {}
-
-  double* row(int number) { return values_.data() + number * stride_; }
-  const double* row(int number) const { return values_.data() + number * stride_; }
-  double at(int number, int segment) const { return values_[number * stride_ + segment]; }
-  void put(int segment, const double* numbers, int count, int first = 0) {
-    for (int k = 0; k < count; ++k) values_[(first + k) * stride_ + segment] = numbers[k];
-  }
-  void get(int segment, double* numbers, int count) const {
-    for (int k = 0; k < count; ++k) numbers[k] = at(k, segment);
-  }
-
- private:
-  static constexpr int kPadding = 4;  // at least the number of SIMD lanes
-
-  int stride_;
-  std::vector<double> values_;
-};
 
 // Bends of all segments in the plane: the outputs of the law, then the chord in the base frame.
 template <class Bend>
@@ -115,24 +93,6 @@ struct SpatialLaw {
   // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_hessian_contraction`.
   static void hessian_contraction(int n, const SegmentInputs& inputs, const Rows& controls, const Rows& bendings,
                                   const Rows& adjoints, Rows& hessians);
-};
-
-// The rod in space: a segment is an arc, its controls a rotation vector (see solver/spatial/arc.py).
-struct SpatialArcLaw {
-  static constexpr int kControl = 3, kBend = 41, kCable = 4, kAdjoint = 6, kHessian = 9;
-  static constexpr int kFirstShared = 30, kShared = 11;  // numbers of a bend that the other laws take
-
-  // Evaluates the law `ccr_spatial_arc` of n segments.
-  static void bend(int n, double length, const Rows& controls, Rows& bends);
-
-  // Evaluates what n segments take up from a cable through a hole of the disks, by the law `ccr_spatial_cable`.
-  static void take(int n, double length, const double* hole, const Rows& controls, const Rows& bends, Rows& cable);
-
-  // Hessian of what n segments take up, by the law `ccr_spatial_cable_hessian`.
-  static void cable_hessian(int n, const double* hole, const Rows& controls, const Rows& bends, Rows& hessians);
-
-  // Contracts the second derivatives of n segments with their adjoints, by the law `ccr_spatial_arc_hessian`.
-  static void hessian_contraction(int n, const Rows& controls, const Rows& bends, const Rows& adjoints, Rows& hessians);
 };
 
 }  // namespace ccr

@@ -13,54 +13,61 @@ SpatialRod::SpatialRod(const Robot& robot)
       frames(robot.segments + 1),
       gradient(robot.segments),
       robot_(robot),
-      controls_(SpatialArcLaw::kControl, robot.segments),
-      laws_(SpatialArcLaw::kBend, robot.segments),
-      adjoints_(SpatialArcLaw::kAdjoint, robot.segments),
-      hessians_(SpatialArcLaw::kHessian, robot.segments),
-      cable_hessians_(SpatialArcLaw::kHessian, robot.segments),
-      bends_(robot.segments),
+      controls_(ArcLaw::kControl, robot.segments),
+      shared_(ArcLaw::kShared, robot.segments),
+      adjoints_(ArcLaw::kAdjoint, robot.segments),
+      hessians_(ArcLaw::kHessian, robot.segments),
+      arcs_(Rows::room(robot.segments)),
       strain_slopes_(robot.segments),
       chords_(robot.segments),
       wrenches_(robot.segments),
       cables_(robot.rod.cables, robot.segments),
-      taken_(robot.rod.cables.size(), Rows(SpatialArcLaw::kCable, robot.segments)) {}
+      distances_(robot.rod.cables.size() * Rows::room(robot.segments)) {
+  frames[0] = kBaseFrame;
+  for (int k = 0; k < cables_.count(); ++k) {
+    const auto& [hole, end] = cables_[k];
+    double* distances = distances_.data() + k * Rows::room(robot.segments);
+    arc_cables_.push_back({{hole[0], hole[1], norm(hole)}, end, distances, cables_.minus_slopes(k)});
+  }
+  pulls_.reserve(arc_cables_.size());
+}
 
 bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& controls) {
   const int n = robot_.segments;
   length_ = command.length / n;
-  for (int i = 0; i < n; ++i) controls_.put(i, controls[i].v.data(), kControl);
-  SpatialArcLaw::bend(n, length_, controls_, laws_);
-  objective = max_objective_slope = widest = 0;
-  states[0] = {};
-  frames[0] = kBaseFrame;
-  for (int i = 0; i < n; ++i) {
-    laws_.get(i, bends_[i].chord.v.data(), SpatialArcLaw::kBend);
-    chords_[i] = move_up(bends_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
-    add_strain(i, controls[i]);
-  }
+  for (int k = 0; k < kControl; ++k)
+    for (int i = 0; i < n; ++i) controls_.row(k)[i] = controls[i][k];
+  ArcLaw::bend(n, length_, controls_, arcs_.data(), shared_);
+  for (int i = 0; i < n; ++i) chords_[i] = move_up(arcs_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
+  add_strain(controls);
   take_up_cables();
   return std::isfinite(objective) && widest <= tolerances::kWidestTurn;
 }
 
-void SpatialRod::add_strain(int segment, const Control& control) {
-  const double *stiffness = &robot_.rod.stiffness[segment * kControl], *rest = &robot_.rod.rest[segment * kControl];
-  for (int k = 0; k < kControl; ++k) {
-    const double strain = control[k] - rest[k];
-    objective += stiffness[k] * strain * strain;
-    strain_slopes_[segment][k] = 2 * stiffness[k] * strain;
-    const double largest = 2 * stiffness[k] * std::max(std::abs(control[k]), std::abs(strain));
-    max_objective_slope = std::max(max_objective_slope, largest);
+void SpatialRod::add_strain(const std::vector<Control>& controls) {
+  const double *stiffness = robot_.rod.stiffness.data(), *rest = robot_.rod.rest.data();
+  double energy = 0, largest = 0, square = 0;
+  for (int i = 0; i < robot_.segments; ++i, stiffness += kControl, rest += kControl) {
+    for (int k = 0; k < kControl; ++k) {
+      const double strain = controls[i][k] - rest[k], slope = 2 * stiffness[k] * strain;
+      energy += stiffness[k] * strain * strain;
+      strain_slopes_[i][k] = slope;
+      largest = std::max(largest, std::max(std::abs(slope), std::abs(2 * stiffness[k] * controls[i][k])));
+    }
+    square = std::max(square, dot(controls[i], controls[i]));
   }
-  widest = std::max(widest, norm(control));
+  objective = energy;
+  max_objective_slope = largest;
+  widest = std::sqrt(square);
 }
 
 void SpatialRod::take_up_cables() {
+  ArcLaw::measure(arc_cables_, controls_, shared_);
   cables_.clear();
   for (int k = 0; k < cables_.count(); ++k) {
-    const int end = cables_[k].end;
-    SpatialArcLaw::take(end, length_, cables_[k].hole.v.data(), controls_, laws_, taken_[k]);
-    const double *value = taken_[k].row(0), *x = taken_[k].row(1), *y = taken_[k].row(2), *z = taken_[k].row(3);
-    for (int i = 0; i < end; ++i) cables_.take(k, i, value[i], {{x[i], y[i], z[i]}});
+    double taken = 0;
+    for (int i = 0; i < arc_cables_[k].end; ++i) taken += length_ - arc_cables_[k].distances[i];
+    cables_.set_taken(k, taken);
   }
 }
 
@@ -72,26 +79,26 @@ void SpatialRod::propagate_adjoints(const std::vector<State>& node_forces) {
     adjoints_.put(i, local.force.v.data(), 3);
     adjoints_.put(i, local.moment.v.data(), 3, 3);
     gradient[i] = strain_slopes_[i];
-    gradient[i] += transpose_times(bends_[i].chord_slope, local.force);
-    gradient[i] += transpose_times(bends_[i].turn_slope, local.moment);
+    gradient[i] += transpose_times(arcs_[i].chord_slope, local.force);
+    gradient[i] += transpose_times(arcs_[i].turn_slope, local.moment);
     wrench.moment += cross(chords_[i], wrench.force);
   }
 }
 
 void SpatialRod::lagrangian_hessian(System& system) const {
-  SpatialArcLaw::hessian_contraction(robot_.segments, controls_, laws_, adjoints_, hessians_);
+  pulls_.clear();
+  for (int j = 0; j < cables_.count(); ++j)
+    if (const double multiplier = cables_.multipliers()[j]; multiplier != 0)
+      pulls_.push_back({&arc_cables_[j], multiplier});
+  ArcLaw::hessian_contraction(robot_.segments, controls_, shared_, adjoints_, pulls_, hessians_);
   for (int i = 0; i < robot_.segments; ++i) {
     System::Stage& stage = system.stages[i];
-    assemble_stage(bends_[i], chords_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
-    hessians_.get(i, stage.huu.v.data(), SpatialArcLaw::kHessian);
-    for (int k = 0; k < kControl; ++k) stage.huu(k, k) += 2 * robot_.rod.stiffness[i * kControl + k];
-  }
-  for (int j = 0; j < cables_.count(); ++j)
-    if (const double multiplier = cables_.multipliers()[j]; multiplier != 0) {
-      SpatialArcLaw::cable_hessian(cables_[j].end, cables_[j].hole.v.data(), controls_, laws_, cable_hessians_);
-      for (int i = 0; i < cables_[j].end; ++i)
-        for (int k = 0; k < kControl * kControl; ++k) system.stages[i].huu[k] -= multiplier * cable_hessians_.at(k, i);
+    assemble_stage(arcs_[i], chords_[i], frames[i], wrenches_[i], stage, system.node_hessian[i]);
+    for (int r = 0, entry = 0; r < kControl; ++r) {
+      for (int c = 0; c <= r; ++c, ++entry) stage.huu(r, c) = stage.huu(c, r) = hessians_.at(entry, i);
+      stage.huu(r, r) += 2 * robot_.rod.stiffness[i * kControl + r];
     }
+  }
   system.node_hessian[robot_.segments] = {};
 }
 
@@ -108,7 +115,7 @@ SpatialRod::Control SpatialRod::disk_slope(int segment, const DiskGap& gap) cons
 // the control is turn_slopeᵀ times the moment, in the lower disk's frame.
 Vec<3> SpatialRod::disk_moment(int segment, const DiskGap& gap) const {
   const Vec<3> slope = disk_slope(segment, gap);
-  const Mat<3, 3>& t = bends_[segment].turn_slope;
+  const Mat<3, 3>& t = arcs_[segment].turn_slope;
   const auto column = [&](int c) { return Vec<3>{{t(0, c), t(1, c), t(2, c)}}; };
   const Vec<3> yz = cross(column(1), column(2)), zx = cross(column(2), column(0)), xy = cross(column(0), column(1));
   const double determinant = dot(column(0), yz);

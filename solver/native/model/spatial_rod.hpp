@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "math/riccati.hpp"
+#include "model/arc.hpp"
 #include "model/robot.hpp"
 #include "model/rod_cables.hpp"
-#include "model/segment.hpp"
 #include "model/spatial_chain.hpp"
 
 namespace ccr {
@@ -72,28 +72,21 @@ class SpatialRod {
   double widest = 0;               // largest rotation of a segment
 
  private:
-  // Outputs of the segment law, in the frame of the lower disk.
-  struct Bend {
-    Vec<3> chord;
-    Mat<3, 3> rotation, chord_slope, turn_slope;
-    double shared[SpatialArcLaw::kShared];
-  };
-
-  static_assert(sizeof(Bend) == SpatialArcLaw::kBend * sizeof(double));
-
+  void add_strain(const std::vector<Control>& controls);
   void take_up_cables();
-  void add_strain(int segment, const Control& control);
 
   Robot robot_;
   double length_ = 0;  // of a segment [mm]
-  Rows controls_, laws_, adjoints_;
-  mutable Rows hessians_, cable_hessians_;
-  std::vector<Bend> bends_;
+  Rows controls_, shared_, adjoints_;
+  mutable Rows hessians_;
+  std::vector<Arc> arcs_;
   std::vector<Control> strain_slopes_;  // slope of the objective in the controls
   std::vector<Vec<3>> chords_;          // of the segments, in the base frame
   std::vector<Wrench> wrenches_;        // adjoints of the upper state of each segment, in its lower disk's frame
   RodCables<kControl> cables_;
-  std::vector<Rows> taken_;  // what the segments take up from each cable, with its derivatives
+  std::vector<double> distances_;  // of the holes of a cable in both disks, by cable and segment [mm]
+  std::vector<ArcCable> arc_cables_;
+  mutable std::vector<ArcPull> pulls_;  // of the taut cables
 };
 
 }  // namespace ccr

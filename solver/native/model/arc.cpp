@@ -1,0 +1,43 @@
+// Two lanes here: without AVX2 a register holds no more, and twice as many lanes spill.
+#define CCR_SIMD narrow
+#define CCR_LANES 2
+#include "model/arc_simd.inc"
+
+namespace ccr {
+
+#ifdef CCR_AVX2
+namespace broad {
+void bend_arcs(int n, double length, const Rows& controls, Arc* arcs, Rows& shared);
+void measure_cables(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared);
+void contract_arcs(int n, const Rows& controls, const Rows& shared, const Rows& adjoints,
+                   std::span<const ArcPull> pulls, Rows& hessians);
+}  // namespace broad
+
+namespace {
+const bool has_avx2 = __builtin_cpu_supports("avx2");
+}
+#endif
+
+void ArcLaw::bend(int n, double length, const Rows& controls, Arc* arcs, Rows& shared) {
+#ifdef CCR_AVX2
+  if (has_avx2) return broad::bend_arcs(n, length, controls, arcs, shared);
+#endif
+  narrow::bend_arcs(n, length, controls, arcs, shared);
+}
+
+void ArcLaw::measure(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared) {
+#ifdef CCR_AVX2
+  if (has_avx2) return broad::measure_cables(cables, controls, shared);
+#endif
+  narrow::measure_cables(cables, controls, shared);
+}
+
+void ArcLaw::hessian_contraction(int n, const Rows& controls, const Rows& shared, const Rows& adjoints,
+                                 std::span<const ArcPull> pulls, Rows& hessians) {
+#ifdef CCR_AVX2
+  if (has_avx2) return broad::contract_arcs(n, controls, shared, adjoints, pulls, hessians);
+#endif
+  narrow::contract_arcs(n, controls, shared, adjoints, pulls, hessians);
+}
+
+}  // namespace ccr
