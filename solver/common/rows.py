@@ -120,15 +120,15 @@ class RowBatch(ABC, Generic[RobotT_co]):
         """
         indices = self._check_indices(robots)
         self._check_rows(rows, len(indices))
-        pairs = list(zip(indices, rows.scenes, strict=True))
+        pairs = zip(indices, rows.scenes, strict=True)
         changed = [(index, scene) for index, scene in pairs if scene is not None and scene != self._scenes[index]]
         compiled = {scene: self._compile(scene) for scene in {scene for _, scene in changed}}
         with self._exclusive:
             for index, scene in changed:
                 self._kernel_batch.set_obstacles(index, compiled[scene])
-            for (index, given), rested in zip(pairs, rows.rested.tolist(), strict=True):
-                self._scenes[index] = given
-                (self._unrested.discard if rested and given is not None else self._unrested.add)(index)
+            for index, assigned, rested in zip(indices, rows.scenes, rows.rested.tolist(), strict=True):
+                self._scenes[index] = assigned
+                (self._unrested.discard if rested and assigned is not None else self._unrested.add)(index)
             for name in NUMBERS:
                 getattr(self, name)[indices] = getattr(rows, name)
 
@@ -170,12 +170,12 @@ class RowBatch(ABC, Generic[RobotT_co]):
         scenes = [scene for scene in check_sequence("scenes", scenes, "a list of scenes") if isinstance(scene, Scene)]
         if len(scenes) != len(robots):
             raise ValueError(f"scenes holds {len(scenes)} scenes; it must hold one for each of {len(robots)} robots")
-        moving = [(robot, scene) for robot, scene in zip(robots, scenes, strict=True) if scene != self.scene(robot)]
-        bounds = [self.scene(robot).check_motion(scene) for robot, scene in moving]
-        return [
-            Motion(robot, scene, self._compile(scene), moved)
-            for (robot, scene), moved in zip(moving, bounds, strict=True)
-        ]
+        pairs = zip(robots, scenes, strict=True)
+        return [self._motion(robot, target) for robot, target in pairs if target != self.scene(robot)]
+
+    def _motion(self, robot: int, scene: Scene) -> Motion:
+        bounds = self.scene(robot).check_motion(scene)
+        return Motion(robot, scene, self._compile(scene), bounds)
 
     def _place(self, motion: Motion, part: float) -> None:
         """Put the obstacles of a robot where they have moved to."""

@@ -57,10 +57,11 @@ void bind_batch(nb::module_& m, const char* name) {
            "Put a robot among other obstacles. Its block stays as it is.")
       .def("rest", &rest<D>, "robots"_a, "length"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Bring some robots to rest at a length, in place.")
-      .def("move", &move<D>, "robots"_a, "motions"_a, "commands"_a, "blocks"_a, "parts"_a, "statuses"_a, "iterations"_a,
-           "factorizations"_a,
-           "Move some robots to their commands while their obstacles move to others, in place. Each motion is where the "
-           "obstacles go to, and bounds on how far their surfaces go.")
+      .def(
+          "move", &move<D>, "robots"_a, "motions"_a, "commands"_a, "blocks"_a, "parts"_a, "statuses"_a, "iterations"_a,
+          "factorizations"_a,
+          "Move some robots to their commands while their obstacles move to others, in place. Each motion is where the "
+          "obstacles go to, and bounds on how far their surfaces go.")
       .def("step", &step<D>, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Move some robots to their commands, cables and length, in place.")
       .def("optimality", &optimality<D>, "blocks"_a, "found"_a,

@@ -122,8 +122,8 @@ class Solver(CommandCheck):
             return Equilibrium.solved(self.robot, self.scene, reached, *work)
         start, bounds = equilibrium.scene, equilibrium.scene.check_motion(scene)
         scenes = kernel_scene(self.robot, start), kernel_scene(self.robot, scene)
-        *work, part = self._kernel.move(equilibrium.block, command, *scenes, bounds, reached)
-        return Equilibrium.solved(self.robot, start.moved_towards(scene, part), reached, *work)
+        *moved, part = self._kernel.move(equilibrium.block, command, *scenes, bounds, reached)
+        return Equilibrium.solved(self.robot, start.moved_towards(scene, part), reached, *moved)
 
     def trace(
         self, equilibrium: Equilibrium, cable_mm: float | Sequence[float], length_mm: float | None = None

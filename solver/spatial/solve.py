@@ -110,8 +110,8 @@ class SpatialSolver(SpatialCommandCheck):
             return SpatialEquilibrium.solved(self.robot, self.scene, reached, *work)
         start, bounds = equilibrium.scene, equilibrium.scene.check_motion(scene)
         scenes = kernel_scene(self.robot, start), kernel_scene(self.robot, scene)
-        *work, part = self._kernel.move(equilibrium.block, command, *scenes, bounds, reached)
-        return SpatialEquilibrium.solved(self.robot, start.moved_towards(scene, part), reached, *work)
+        *moved, part = self._kernel.move(equilibrium.block, command, *scenes, bounds, reached)
+        return SpatialEquilibrium.solved(self.robot, start.moved_towards(scene, part), reached, *moved)
 
     def trace(self, equilibrium: SpatialEquilibrium, cables_mm: Sequence[float] | np.ndarray) -> Trace:
         """Return every shape accepted on the way of :meth:`step`, beginning with the present one.

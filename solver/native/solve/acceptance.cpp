@@ -41,8 +41,7 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   const double loss = energy_loss(command);
   if (left_branch(command, moved, loss)) return Move::kRejected;
   const double tension = highest(trial_tensions_), limit = problem_.robot().max_tension;
-  const bool pulled =
-      pulls_cable(command) && command.length == present_.command.length && !moves_obstacles(command);
+  const bool pulled = pulls_cable(command) && command.length == present_.command.length && !moves_obstacles(command);
   const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
   const bool rising = pulled || (!loading && !only_releases(command) && tension > highest(tensions_));
   if (rising && tension > limit) return Move::kOverTension;

@@ -18,6 +18,7 @@ struct ModelContinuation<Model>::Pursuit {
   bool was_resumed = false;  // whether they were
   double step = kLargestStep;
   double yielding = kYield;  // least displacement of the next yield [a]
+  bool holds = false;        // whether obstacles have pressed the cable to its limit, which is not pulled meanwhile
   bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
   Status reached = Status::kConverged;
   bool over = false;  // with `reached`
@@ -171,7 +172,7 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
       pursuit.yielding = kYield;
     }
     Command goal = raise_to_pretension(pursuit.wanted);
-    if (highest(tensions_) > limit) goal.scene = present_.command.scene;  // obstacles wait until the motors hold
+    if (moves_obstacles(goal)) share_motion(goal, pursuit.holds);
     const double remaining = command_distance(present_.command, goal);
     if (remaining == 0 && resume(pursuit)) continue;
     if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;
@@ -196,9 +197,8 @@ bool ModelContinuation<Model>::resume(Pursuit& pursuit) const {
 template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
   double& step = pursuit.step;
-  bool stalled =
-      layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) &&
-      goal.length == present_.command.length && !moves_obstacles(goal);
+  bool stalled = layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) &&
+                 goal.length == present_.command.length && !moves_obstacles(goal);
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
   const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
   Move move = stalled ? Move::kOverTension : try_command(next);
@@ -244,8 +244,10 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
 // One sub-step in which obstacles press so much that the motor has to let the cable out; false where they cannot go on.
 template <class Model>
 bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, double size) {
+  pursuit.holds = true;
   if (pay_out(next)) {
-    pursuit.step = size;
+    pursuit.step = pursuit.refined ? size : std::min(2 * size, kLargestStep);
+    pursuit.refined = false;
   } else {
     pursuit.step = size / 2;
     pursuit.refined = true;

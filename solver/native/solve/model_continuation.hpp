@@ -126,6 +126,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool is_at_tension_limit() const;
   bool is_tight() const;
   bool approach_tension_limit();
+  void share_motion(Command& goal, bool holds) const;
   bool pay_out(const Command& command);
   bool hold_stalled_cables(Command& wanted) const;
   bool yield_cables(Command& wanted, double least) const;

@@ -75,6 +75,16 @@ StepResult ModelContinuation<Model>::move(const double* from, const double* targ
   return result;
 }
 
+// Lets obstacles wait until the motors hold, and a cable that is held at its limit until they are where they go: the
+// way there is not one of proportional rates then.
+template <class Model>
+void ModelContinuation<Model>::share_motion(Command& goal, bool holds) const {
+  if (highest(tensions_) > problem_.robot().max_tension)
+    goal.scene = present_.command.scene;
+  else if (layout_.cables.size == 1 && (holds || is_at_tension_limit()) && pulls_cable(goal))
+    goal.cables = present_.command.cables;
+}
+
 // Where obstacles on their way to a command press so much that the motor cannot hold the only cable: lets it out until
 // it is held at the limit. `trial_` is the equilibrium under the command. False where letting out does not help.
 template <class Model>
@@ -84,8 +94,11 @@ bool ModelContinuation<Model>::pay_out(const Command& command) {
   const double compliance = robot.offset * robot.offset * robot.max_length / robot.rigidity;  // of a free robot [mm/N]
   Command above = command, below = command;
   Tensions tensions = trial_tensions_;
-  double out = compliance * (highest(tensions) - robot.max_tension) + kCommandResolution * robot.offset;
-  for (int i = 0; i < kStallIterations; ++i, out *= 2) {
+  double out = 0;
+  for (int i = 0; i < kStallIterations; ++i) {
+    const double pulled = above.cables[0] - present_.command.cables[0];
+    const double needed = compliance * (highest(tensions) - robot.max_tension) + kCommandResolution * robot.offset;
+    out = pulled > 0 ? pulled : std::max(2 * out, needed);
     below.cables[0] = std::max(above.cables[0] - out, least);
     if (!(below.cables[0] < above.cables[0])) return false;
     const Move move = try_command(below);
@@ -103,12 +116,13 @@ bool ModelContinuation<Model>::pay_out(const Command& command) {
   return false;
 }
 
-#define CCR_INSTANTIATE(Model)                                                                                       \
-  template void ContactProblem<Model>::move_obstacles(std::span<const Obstacle>, std::span<const double>);           \
-  template void ContactProblem<Model>::place_obstacles(double);                                                      \
-  template ContactProblem<Model>::Position ContactProblem<Model>::displacement(int, double, double) const;           \
+#define CCR_INSTANTIATE(Model)                                                                                        \
+  template void ContactProblem<Model>::move_obstacles(std::span<const Obstacle>, std::span<const double>);            \
+  template void ContactProblem<Model>::place_obstacles(double);                                                       \
+  template ContactProblem<Model>::Position ContactProblem<Model>::displacement(int, double, double) const;            \
   template StepResult ModelContinuation<Model>::move(const double*, const double*, std::span<const Obstacle<kSpace>>, \
-                                                     std::span<const double>, double*);                              \
+                                                     std::span<const double>, double*);                               \
+  template void ModelContinuation<Model>::share_motion(Command&, bool) const;                                         \
   template bool ModelContinuation<Model>::pay_out(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

@@ -13,7 +13,8 @@ void ModelContinuation<Model>::update_trend() {
   const double travelled = travel(present_.command, trial_.command);
   clear_trend();
   const bool known = bends_evenly_ && !problem_.touches_obstacle(now);
-  if (travelled == 0 || trial_.command.length != present_.command.length || moves_obstacles(trial_.command) || known || before.count != now.count ||
+  if (travelled == 0 || trial_.command.length != present_.command.length || moves_obstacles(trial_.command) || known ||
+      before.count != now.count ||
       !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
     return;
   const auto slope = [&](const auto& now, const auto& before, auto& slope) {
