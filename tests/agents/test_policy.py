@@ -10,6 +10,4 @@ def test_set_points_stay_as_they_are_unless_they_are_previewed():
     assert set_points(now, 3) == pytest.approx(np.full(3, 0.5 * FORCE_SPAN))
     previewed = {"desired_force": np.array([0.1]), "desired_ahead": 0.1 + 0.02 * np.array(AHEAD)}
     steps = np.arange(1, max(AHEAD) + 3)
-    assert set_points(previewed, len(steps)) == pytest.approx(
-        FORCE_SPAN * (0.1 + 0.02 * np.minimum(steps, max(AHEAD)))
-    )
+    assert set_points(previewed, len(steps)) == pytest.approx(FORCE_SPAN * (0.1 + 0.02 * np.minimum(steps, max(AHEAD))))

