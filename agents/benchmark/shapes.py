@@ -25,7 +25,9 @@ def draw_shape(axis: Axes, equilibrium: Equilibrium) -> None:
     axis.plot(nodes[:, 0], nodes[:, 1], color=BACKBONE, lw=2.5)
     axis.plot(cable[:, 0], cable[:, 1], color=CABLE, lw=1)
     axis.plot(*_contacts(equilibrium).T, "o", color="crimson", ms=6, mfc="none")
-    axis.set(aspect="equal", xlim=(-25, 125), ylim=(-5, 190), xlabel="x [mm]", ylabel="y [mm]")
+    length = equilibrium.robot.longest_mm
+    axis.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+    axis.set(xlim=(-0.14 * length, 0.7 * length), ylim=(-0.03 * length, 1.06 * length))
     axis.grid(alpha=0.3)
 
 
@@ -41,7 +43,9 @@ def draw_shape_in_space(axis: Axes3D, equilibrium: SpatialEquilibrium) -> None:
     for cable in equilibrium.pulled:
         axis.plot(*cable.T, color=CABLE, lw=1)
     axis.plot(*_contacts(equilibrium).T, "o", color="crimson", ms=6, mfc="none")
-    axis.set(xlim=(-90, 90), ylim=(-90, 90), zlim=(0, 180), xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
+    length = equilibrium.robot.length_mm
+    sideways = (-length / 2, length / 2)
+    axis.set(xlim=sideways, ylim=sideways, zlim=(0, length), xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
     axis.set_box_aspect((1, 1, 1), zoom=0.85)
     axis.tick_params(labelsize=7)
 
@@ -54,7 +58,8 @@ def _contacts(equilibrium: Equilibrium | SpatialEquilibrium) -> np.ndarray:
 
 def plate(wall: HalfPlane, backbone: np.ndarray) -> np.ndarray:
     """Return the ends of the visible part of a wall, ``(2, 2)`` [mm]: a plate if only some nodes touch it."""
-    half = 200.0 if wall.nodes is None else 15.0
+    length = np.linalg.norm(np.diff(backbone, axis=0), axis=1).sum()
+    half = length if wall.nodes is None else length / 12
     touching = backbone[list(wall.nodes or range(len(backbone)))]
     center = wall.nearest(touching.mean(axis=0))
     return np.asarray(center + half * np.array([[-1.0], [1.0]]) * wall.axes[1])

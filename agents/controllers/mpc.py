@@ -23,7 +23,8 @@ class PredictiveController:
     from its observations and the known geometry of the robot: latency and backlash, and from them the present
     displacement of the cable (:class:`LagEstimator`); force and slope there, from a curve through the readings so far
     that weights nearby readings most; and the zero of the force sensor, from the time before contact. All cables move
-    in the direction of the search, and displacements are summed over the sections; an insertion stays where it is.
+    in the direction of the search; an insertion stays where it is. A robot of S sections, each of which keeps its bend,
+    is about S² times as stiff: the sum of its commands counts S² times, so that the same assumptions suit it.
 
     Attributes:
         settings: Assumptions, and weights of the plan.
@@ -50,7 +51,7 @@ class PredictiveController:
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then the first move of a plan."""
         direction, settings = search(observation), self._env.get_wrapper_attr("settings")
-        sections, travel = settings.actuation.sections, settings.scales.travel_mm
+        span, travel = settings.actuation.sections**3, settings.scales.travel_mm
         along = direction[: observation["cable"].size] / float(direction @ direction)
         motor = float(observation["cable"] @ along) * settings.cable_limit_mm / travel
         observed = float(observed_commands(observation, settings.robot) @ along)
@@ -58,13 +59,13 @@ class PredictiveController:
         measured = self._tare.force(observation)
         if measured is None:
             return direction
-        self._readings.append((sections * observed, float(np.linalg.norm(measured))))
-        increment = sections * settings.max_increment_mm / travel
-        move = self._move(sections * self._lag.cables.item(), increment, set_points(observation, self.settings.horizon))
+        self._readings.append((span * observed, float(np.linalg.norm(measured))))
+        increment = span * settings.max_increment_mm / travel
+        move = self._move(span * self._lag.cables.item(), increment, set_points(observation, self.settings.horizon))
         if move == 0:
             return np.zeros_like(direction)
         play = self._lag.cables.item() + np.copysign(self._lag.half_backlash.item(), move) - motor
-        action = min(max((move + sections * play) / increment, -1.0), 1.0)
+        action = min(max((move + span * play) / increment, -1.0), 1.0)
         return np.asarray(action * direction, np.float32)
 
     def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:

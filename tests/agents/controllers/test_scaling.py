@@ -42,7 +42,7 @@ def played(name, env_id, robot, steps=40):
 )
 def test_a_robot_of_another_size_gets_the_same_actions(name, env_id, robot):
     expected = played(name, env_id, robot)
-    assert np.abs(expected[-20:]).max() < 1  # it regulates, after the search
+    assert np.abs(np.diff(expected, axis=0)).max() > 0.1  # it regulates, after the search
     for s in (0.1, 10.0):
         assert played(name, env_id, scaled(robot, s)) == pytest.approx(expected, abs=1e-6)
 

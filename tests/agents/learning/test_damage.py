@@ -14,7 +14,6 @@ from agents.config import TrainConfig
 from agents.errors import UserError
 from agents.learning import checkpoint, distillation, training
 from agents.learning.actor import ACTOR, LearnedPolicy
-from agents.learning.pretrained import trained
 from agents.learning.tensors import read_tensors, write_tensors
 from agents.tuned import DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings
 
@@ -228,9 +227,13 @@ def test_a_damaged_checkpoint_ends_the_command_in_one_line(saved, tmp_path, monk
 
 
 @pytest.mark.parametrize("learner", sorted(SMALL))
-def test_actors(learner, tmp_path):
+def test_actors(learner, tmp_path, monkeypatch):
+    for module in (training, distillation):
+        monkeypatch.setattr(module, "VALIDATION_EPISODES", 2)
+    run = training.train(TrainConfig(run=tmp_path / "run", learner=SMALL[learner], threads=1), progress=False)
+
     def refused(damage, message):
-        tensors, values = read_tensors(trained(learner, "CCR/LoadCell-v1")[0])
+        tensors, values = read_tensors(run / ACTOR)
         damage(tensors, values)
         write_tensors(tmp_path / ACTOR, tensors, values)
         with pytest.raises(UserError, match=rf"is not a trained policy .*{message}.*; remove it, and train again"):

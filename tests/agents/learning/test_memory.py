@@ -1,8 +1,8 @@
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
 
+from agents.environment import make_env
 from agents.learning.memory import DECAYS, MOVES, Memory, MemoryVecEnv
 from agents.learning.sb3_adapter import SB3VecEnv
 from ccr_gym import ENV_IDS, Settings
@@ -12,7 +12,7 @@ def memory():
     sizes = {"cable": 1, "contact": 2, "desired_force": 1, "force_est": 2, "force_measured": 2, "nodes": 3 * 19}
     space = spaces.Dict({key: spaces.Box(-1.0, 1.0, (size,)) for key, size in sizes.items()})
     settings = Settings()
-    return Memory(space, 1, settings.robot, settings.cable_limit_mm), sum(sizes.values())
+    return Memory(space, 1, settings), sum(sizes.values())
 
 
 def seen(cable=0.0, touching=False, measured=(0.0, 0.0), estimate=(0.0, 0.0), desired=0.2):
@@ -52,7 +52,7 @@ def test_errors_fade_at_their_rates_and_moves_pass_by():
     assert errors[1] == pytest.approx(fading * errors[0], abs=1e-5)  # there is no error now
     moves, (latency, slack, unseen, behind) = np.split(last[start + 4 + 2 * len(DECAYS) :], [MOVES])
     assert moves == pytest.approx([2.8] + [0] * (MOVES - 1), abs=1e-6)
-    assert (latency, unseen, behind) == (pytest.approx(1), pytest.approx(1.4 - slack), pytest.approx(-slack))
+    assert (latency, unseen, behind) == (pytest.approx(1), pytest.approx(0.175 - slack), pytest.approx(-slack))
     remembers.reset()
     assert np.array_equal(remembers.update(shown[0])[0], first)
 
@@ -61,9 +61,9 @@ def test_errors_fade_at_their_rates_and_moves_pass_by():
 def test_vectors_remember_as_single_environments_do(env_id):
     kwargs = {"sensing": "realistic", "split": "train"}
     envs = MemoryVecEnv(SB3VecEnv(env_id, 2, 5, obs_mode="dict", **kwargs))
-    env = gymnasium.make(env_id, disable_env_checker=True, **kwargs)
+    env = make_env(env_id, **kwargs)
     settings, generator = env.unwrapped.settings, np.random.default_rng(0)
-    alone = Memory(env.observation_space, 1, settings.robot, settings.cable_limit_mm)
+    alone = Memory(env.observation_space, 1, settings)
     rows, (observation, _) = envs.reset(), env.reset(seed=6)
     assert envs.observation_space.contains(rows[0])
     ends = 0

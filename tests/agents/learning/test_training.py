@@ -6,13 +6,13 @@ import pickle
 from dataclasses import replace
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
 
 from agents import files
 from agents.config import TrainConfig
+from agents.environment import make_env
 from agents.errors import UserError
 from agents.files import locked
 from agents.learning import checkpoint, distillation, log, training
@@ -57,7 +57,7 @@ def test_the_actor_acts_as_the_learner_does(name, tmp_path, monkeypatch):
     config = TrainConfig(run=tmp_path, learner=SMALL[name], threads=1)
     actor = LearnedPolicy(train(config, progress=False))
     policy, statistics, rows = kept["policy"], kept["statistics"], make_envs(config, 1, 7)
-    env = gymnasium.make(config.env_id, disable_env_checker=True, sensing=config.sensing, split="train")
+    env = make_env(config.env_id, sensing=config.sensing, split="train")
     observation, _ = env.reset(seed=7)
     seen, state = rows.reset(), None
     for step in range(20):
@@ -387,7 +387,7 @@ def test_a_damaged_checkpoint_is_refused_and_runs_nothing(tmp_path, monkeypatch,
 
 def test_an_observation_of_another_environment_is_refused():
     policy = LearnedPolicy(trained("Distilled", "CCR/PushObstacle-v1")[0])
-    env = gymnasium.make("CCR/TrackForce-v1", sensing="realistic", disable_env_checker=True)
+    env = make_env("CCR/TrackForce-v1", sensing="realistic")
     with pytest.raises(ValueError, match="trained on CCR/PushObstacle-v1 with realistic sensing"):
         policy.act(env.reset(seed=0)[0])
 
