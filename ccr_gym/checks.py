@@ -173,6 +173,19 @@ def check_range(
     return first, last
 
 
+def check_fractions(name: str, value: object, *, count: int) -> tuple[float, ...]:
+    """Return some numbers from 0 to below 1 as a tuple of floats.
+
+    Raises:
+        ValueError: If they are not that.
+    """
+    bound = f"{count} numbers from 0 to below 1"
+    entries = validation.check_sequence(name, value, bound)
+    if len(entries) != count or not all(is_real(entry) and 0 <= entry < 1 for entry in entries):
+        raise refusal(name, value, bound)
+    return tuple(map(float, entries))
+
+
 def check_ranges(name: str, value: object, *, bounds: Sequence[Mapping[str, float]]) -> tuple[tuple[float, float], ...]:
     """Return several ranges as a tuple, each checked against bounds of its own."""
     wanted = f"{len(bounds)} ranges of two numbers each"

@@ -11,6 +11,7 @@ from ccr_gym.tasks import (
     BracedPush,
     InsertAndPush,
     LoadCell,
+    MovingObstacle,
     PushObstacle,
     SoftObstacle,
     SpatialPush,
@@ -113,6 +114,20 @@ class SoftObstacleEnv(TaskEnv):  # noqa: D101 - below
         "As `PushObstacle`, but the obstacle is mounted on a spring and yields. The stiffness varies more than "
         "tenfold between episodes, and with it the force that a millimetre of cable adds.",
         CIRCLE + ", the stiffness in {spring} EI/L³, uniform in its logarithm." + FEASIBLE,
+    )
+
+
+class MovingObstacleEnv(TaskEnv):  # noqa: D101 - below
+    task_class = MovingObstacle
+    __doc__ = describe(
+        MovingObstacle(),
+        "Hold a force on an obstacle that breathes.",
+        "As `PushObstacle`, but the obstacle moves within the episode, as an organ does that breathes: it moves away "
+        "and back in one direction, and rests between breaths. `info` says how far it has moved (`obstacle_mm`). Where "
+        "it presses so hard that the motor cannot hold the cable, the cable pays out; where that does not help, the "
+        "obstacle stops.",
+        CIRCLE + ". A breath is {depth} L deep and takes {period} steps; single breaths deviate by up to the fractions "
+        "{variation}. The drift over the episode is {drift} L." + FEASIBLE,
     )
 
 

@@ -127,6 +127,7 @@ class EpisodeBatch(Transition):
                 0.0, as_scalar(norm(reading.force_true), index) - self._settings.force_limit
             ),
             "is_success": reading.error <= SUCCESS_ERROR,
+            **({"obstacle_mm": self.obstacles_moved_mm(index)} if self._task.obstacles_move else {}),
             **{f"reward_{name}": term for name, term in zip(TERMS, terms, strict=True)},
         }
 

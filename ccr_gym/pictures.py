@@ -69,6 +69,7 @@ class Pictures:
             float(reading.desired),
             episodes.shown_force_n,
             target=episodes.target,
+            start_scene=episodes.start_scene(robot),
             desired_history=desired,
             true_history=true,
             estimate_history=estimate,

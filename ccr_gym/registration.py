@@ -6,6 +6,7 @@ from ccr_gym.envs import (
     BracedPushEnv,
     InsertAndPushEnv,
     LoadCellEnv,
+    MovingObstacleEnv,
     PushObstacleEnv,
     SoftObstacleEnv,
     SpatialPushEnv,
@@ -21,6 +22,7 @@ TASK_ENVS: tuple[type[TaskEnv], ...] = (
     TrackForceEnv,
     BracedPushEnv,
     SoftObstacleEnv,
+    MovingObstacleEnv,
     InsertAndPushEnv,
     SpatialPushEnv,
 )

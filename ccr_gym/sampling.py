@@ -210,3 +210,5 @@ def _check_sample(task: AnyTask, robot: AnyRobot, sampled: Assignment) -> None:
         profile = check_array("sampled profile", sampled.profile, (PROFILE_STEPS,))
         if not ((profile > 0).all() and (profile <= 1).all()):
             raise refusal("sampled profile", sampled.profile, "above 0 and at most 1 at every step")
+    if sampled.motion is not None:
+        check_array("sampled motion", sampled.motion, (PROFILE_STEPS, task.adapter.space))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ccr_gym.checks import check_type
+from solver import Scene
 from solver.common.rows import Rows
 
 Arrays = dict[str, np.ndarray]
@@ -18,6 +19,7 @@ class EpisodeState:
 
     Attributes:
         rows: The robots among their obstacles.
+        starts: Their scenes at the start of the episodes.
         free: Robots of the estimator that nothing touches; ``None`` where it needs none.
         episode: Set-points, time and actions.
         estimator: What the estimator has learnt.
@@ -25,6 +27,7 @@ class EpisodeState:
     """
 
     rows: Rows
+    starts: tuple[Scene | None, ...]
     free: Rows | None
     episode: Arrays
     estimator: Arrays

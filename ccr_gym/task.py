@@ -51,12 +51,15 @@ class Assignment(NamedTuple):
             and y, ``(d − 1,)``.
         profile: Factors of the set-point at every step, ``(PROFILE_STEPS,)``, the last one kept from then on; ``None``
             for a constant set-point.
+        motion: Displacements of the obstacles from where they are at the start, at every step,
+            ``(PROFILE_STEPS, d)`` [mm], the last one kept from then on; ``None`` where they stay.
     """
 
     scene: Scene
     desired_force: float | np.ndarray
     direction: tuple[float, ...] = (1.0,)
     profile: np.ndarray | None = None
+    motion: np.ndarray | None = None
 
 
 class Task(ABC, Generic[RobotT]):
@@ -69,6 +72,7 @@ class Task(ABC, Generic[RobotT]):
         obstacles: Number of obstacles of every scene.
         target: Index of the obstacle whose contact force is regulated; ``None`` for the sum over all.
         moving: Whether the set-point moves, and is previewed.
+        obstacles_move: Whether the obstacles move within an episode.
         steps: Steps of an episode.
     """
 
@@ -78,6 +82,7 @@ class Task(ABC, Generic[RobotT]):
     obstacles: ClassVar[int] = 1
     target: ClassVar[int | None] = None
     moving: ClassVar[bool] = False
+    obstacles_move: ClassVar[bool] = False
     steps: ClassVar[int] = 64
 
     def __post_init__(self) -> None:

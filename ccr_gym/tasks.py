@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from ccr_gym.adapters import AnyAdapter, InsertionAdapter, SpatialAdapter
-from ccr_gym.checks import check_flag, check_instance, check_number, check_range, check_ranges, checked
+from ccr_gym.checks import check_flag, check_fractions, check_instance, check_number, check_range, check_ranges, checked
 from ccr_gym.scales import Scales
 from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment, Range, Task, check_force_range, uniform
 from solver import Circle, HalfPlane, Robot, Scene
@@ -22,6 +22,8 @@ from solver.spatial import Cylinder, SpatialRobot, Sphere
 PAPER_MM = 180.0  # length of the paper's robot
 HALF_CYLINDER = 1 / 6  # half the length of a cylinder [L]
 CYLINDER_EDGE = 1 / 90  # rounding of its edges [L]
+TURN = (0.0, 2 * math.pi)  # range of an angle
+BREATHS = 64  # as many as an episode can have, and more
 LEVELS = (0.3, 1.0)  # range of the levels of a moving set-point, before they are scaled to a maximum of 1
 CIRCLE: tuple[dict[str, float], ...] = ({}, {}, {"low": SMALLEST})  # bounds of x, y and radius
 
@@ -153,6 +155,43 @@ class SoftObstacle(PushObstacle):
 
 
 @dataclass(frozen=True, slots=True)
+class MovingObstacle(PushObstacle):
+    """A circular obstacle that breathes, and may drift meanwhile.
+
+    A breath moves it by ``depth · sin⁴(π t/T)`` in a direction of the episode and back, as organs rest between breaths;
+    depth and period T vary from breath to breath.
+
+    Attributes:
+        depth: Range of the depth of a breath [L].
+        period: Range of its period [steps].
+        variation: Largest deviations of depth and period of a single breath, as fractions.
+        drift: Range of the drift over the episode, in a direction of its own [L].
+    """
+
+    obstacles_move: ClassVar[bool] = True
+    steps: ClassVar[int] = PROFILE_STEPS
+
+    depth: Range = checked((1 / PAPER_MM, 2 / PAPER_MM), check_range, low=0, high=0.1)
+    period: Range = checked((16.0, 48.0), check_range, low=4, high=PROFILE_STEPS)
+    variation: Range = checked((0.25, 0.15), check_fractions, count=2)
+    drift: Range = checked((0.0, 0.0), check_range, low=0, high=0.1)
+
+    def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
+        """Return a circle, a set-point, and the motion of the circle."""
+        sampled = PushObstacle.sample(self, robot, generator)
+        depth, period, drift, *directions = uniform(generator, self.depth, self.period, self.drift, TURN, TURN)
+        deviations = generator.uniform(-1, 1, (2, BREATHS)) * np.array(self.variation)[:, None]
+        breathing, drifting = ((math.cos(angle), math.sin(angle)) for angle in directions)
+        ends = np.cumsum(period * (1 + deviations[1]))
+        now = np.arange(PROFILE_STEPS)
+        breath = np.searchsorted(ends, now, side="right")
+        phase = (ends[breath] - now) / (period * (1 + deviations[1, breath]))
+        moved = depth * (1 + deviations[0, breath]) * np.sin(math.pi * phase) ** 4
+        motion = np.outer(moved, breathing) + np.outer(drift * now / PROFILE_STEPS, drifting)
+        return sampled._replace(motion=Scales.of(robot).length_mm * motion)
+
+
+@dataclass(frozen=True, slots=True)
 class InsertAndPush(PushObstacle):
     """A circular obstacle, pushed with the cable and the insertion of the base."""
 
@@ -218,7 +257,16 @@ class SpatialPush(Task[SpatialRobot]):
 
 TASKS: dict[str, type[AnyTask]] = {
     task.__name__: task
-    for task in (LoadCell, PushObstacle, TrackForce, BracedPush, SoftObstacle, InsertAndPush, SpatialPush)
+    for task in (
+        LoadCell,
+        PushObstacle,
+        TrackForce,
+        BracedPush,
+        SoftObstacle,
+        MovingObstacle,
+        InsertAndPush,
+        SpatialPush,
+    )
 }
 
 

@@ -17,13 +17,22 @@ from ccr_gym.sensing import Imperfections, SensorModel, sample_imperfections
 from ccr_gym.settings import AnySettings
 from ccr_gym.state import EpisodeState, put, take
 from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment
-from solver import Equilibrium
+from solver import Equilibrium, Scene
 from solver.common.batch import BaseBatch
 from solver.spatial import SpatialEquilibrium
 
 ALL = slice(None)
 SEEDS = 2**32
-STATE = ("_desired_n", "_goal_n", "_profiles", "_actuated_mm", "_last_actions", "_obstacle_features", "_time")
+STATE = (
+    "_desired_n",
+    "_goal_n",
+    "_profiles",
+    "_motions_mm",
+    "_actuated_mm",
+    "_last_actions",
+    "_obstacle_features",
+    "_time",
+)
 
 
 class Pipeline(NamedTuple):
@@ -73,6 +82,8 @@ class Transition:
         self._desired_n = np.ones(count)  # magnitudes of the set-points, the largest ones where they move
         self._goal_n = np.ones((count, space))  # the set-points where they are vectors
         self._profiles = np.ones((count, PROFILE_STEPS)) if task.moving else None
+        self._motions_mm = np.zeros((count, PROFILE_STEPS, space)) if task.obstacles_move else None
+        self._starts: list[Scene | None] = [None] * count  # scenes at the start of the episodes
         self._actuated_mm, self._last_actions = np.zeros((count, actions)), np.zeros((count, actions))
         self._obstacle_features = np.zeros((count, self.adapter.obstacle_size))
         self._time = np.zeros(count, int)  # steps of the episode
@@ -158,6 +169,9 @@ class Transition:
         self._last_actions[robots], self._time[robots] = 0.0, 0
         self._actuated_mm[robots] = self.adapter.actuated_mm(self.batch.blocks[robots], self._actuated_mm[robots] * 0.0)
         for robot, assignment, sampled in zip(robots, assignments, imperfections, strict=True):
+            self._starts[robot] = assignment.scene
+            if self._motions_mm is not None:
+                self._motions_mm[robot] = 0.0 if assignment.motion is None else assignment.motion
             if self._profiles is not None:
                 self._profiles[robot] = 1.0 if assignment.profile is None else assignment.profile
             if self._sensors is not None and sampled is not None:
@@ -182,12 +196,40 @@ class Transition:
         adapter.write_command(batch.commands, commanded, index)
         self._last_actions[index] = actions
         self._time[index] += 1
-        batch.move(index)
+        batch.move(index, self._scenes_ahead(index))
         blocks = batch.blocks[index]
         self._actuated_mm[index] = adapter.actuated_mm(blocks, commanded)
         if sensors is not None:
             sensors.move_cables(before, self._layout.cables(blocks), index)
         self._estimate(index)
+
+    def _scenes_ahead(self, index: EnvIndex) -> list[Scene] | None:
+        """Return where the obstacles of robots are to be after the step, None where they stay."""
+        if self._motions_mm is None:
+            return None
+        robots = np.atleast_1d(np.arange(self.count)[index]).tolist()
+        times = np.minimum(self._time, PROFILE_STEPS - 1)
+        return [self._shifted(robot, self._motions_mm[robot, times[robot]]) for robot in robots]
+
+    def _shifted(self, robot: int, by_mm: np.ndarray) -> Scene:
+        start = self._starts[robot]
+        assert start is not None
+        return Scene(obstacle.shifted(by_mm.tolist()) for obstacle in start)
+
+    def start_scene(self, robot: int) -> Scene | None:
+        """Return the scene of a robot at the start of its episode."""
+        return self._starts[robot]
+
+    def obstacles_moved_mm(self, index: EnvIndex) -> np.ndarray:
+        """Return how far the first obstacle has moved since the start, ``(..., d)`` [mm]."""
+        robots = np.arange(self.count)[index]
+        moved = np.zeros((self.count, self.adapter.space))
+        for robot in np.atleast_1d(robots).tolist():
+            start = self._starts[robot]
+            if start is not None and len(start):
+                now = self.batch.scene(robot).obstacles[0].extent.center
+                moved[robot] = np.subtract(now, start.obstacles[0].extent.center)
+        return np.asarray(moved[index])
 
     def _estimate(self, index: EnvIndex) -> None:
         """Estimate the forces of robots that have moved."""
@@ -233,7 +275,8 @@ class Transition:
         """Return the states of the episodes of some robots."""
         learnt, free = self._estimator.get_rows(robots)
         sensors = {} if self._sensors is None else self._sensors.get_rows(robots)
-        return EpisodeState(self.batch.get_rows(robots), free, take(self, STATE, robots), learnt, sensors)
+        starts = tuple(self._starts[robot] for robot in robots)
+        return EpisodeState(self.batch.get_rows(robots), starts, free, take(self, STATE, robots), learnt, sensors)
 
     def set_rows(self, robots: list[int], state: EpisodeState) -> None:
         """Put robots into states of :meth:`get_rows`, from which they go on with the same bits.
@@ -246,6 +289,8 @@ class Transition:
         self.batch.set_rows(robots, state.rows)
         self._estimator.set_rows(robots, state.estimator, state.free)
         put(self, state.episode, robots)
+        for robot, start in zip(robots, state.starts, strict=True):
+            self._starts[robot] = start
         if self._sensors is not None:
             self._sensors.set_rows(robots, state.sensors)
 
