@@ -181,9 +181,10 @@ def check_fractions(name: str, value: object, *, count: int) -> tuple[float, ...
     """
     bound = f"{count} numbers from 0 to below 1"
     entries = validation.check_sequence(name, value, bound)
-    if len(entries) != count or not all(is_real(entry) and 0 <= entry < 1 for entry in entries):
+    fractions = [float(entry) for entry in entries if is_real(entry) and 0 <= entry < 1]
+    if not len(fractions) == len(entries) == count:
         raise refusal(name, value, bound)
-    return tuple(map(float, entries))
+    return tuple(fractions)
 
 
 def check_ranges(name: str, value: object, *, bounds: Sequence[Mapping[str, float]]) -> tuple[tuple[float, float], ...]:

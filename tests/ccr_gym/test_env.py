@@ -170,14 +170,14 @@ def test_arguments_are_json_able():
         json.dumps(
             {
                 "task": {"radius": [0.07, 0.08]},
-                "robot": {"length_mm": 180.0, "segments": 12, "offset_mm": 8.0},
+                "robot": {"length_mm": 180.0, "segments": 24, "offset_mm": 8.0},
                 "weights": {"effort": 0.0},
             }
         )
     )
     env = make("CCR/PushObstacle-v1", obs_mode="dict", **kwargs)
     observation, _ = env.reset(seed=0)
-    assert observation["nodes"].shape == (39,)
+    assert observation["nodes"].shape == (75,)
     assert 12.6 <= env.unwrapped.equilibrium.scene.obstacles[0].radius <= 14.4
 
 
