@@ -40,8 +40,8 @@ def _training(result: Result) -> str:
     settings = ", ".join(f"{name} {value:g}" for name, value in asdict(learner).items())
     seeds = ", ".join(str(training.config.seed) for training in result.trainings)
     seconds = result.summary["training_seconds"]
-    return f"""**Training**: scenes of `split="train"`, training seed {seeds}, {seconds:.0f} s on one core of the
-        machine it was trained on. Settings: {settings}."""
+    return f"""**Training**: scenes of `split="train"`, training seed {seeds}, trained in {seconds:.0f} s on a
+        machine that may have done other work. Settings: {settings}."""
 
 
 def _sensing(sensing: str) -> str:

@@ -39,7 +39,7 @@ def test_what_the_sensor_reads_without_contact_is_taken_off():
         seen = {
             "force_measured": np.array(reading, np.float32),
             "desired_force": goal,
-            "cable": np.zeros(1, np.float32),
+            "cable": cable,
         }
         action = controller.act({**seen, "contact": np.full(38, touching, np.float32)})
     assert action == pytest.approx(0, abs=1e-6)
