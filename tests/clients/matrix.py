@@ -31,11 +31,11 @@ GROUPS = {
 
 
 def main(wanted: list[str]) -> int:
-    """Run the clients of these names, or all, and return the number of those that failed."""
+    """Run the clients of these groups or names, or all, and return the number of those that failed."""
     rows = []
     for group, names in GROUPS.items():
         for name in names:
-            if not wanted or name in wanted:
+            if not wanted or {group, name} & set(wanted):
                 rows.append((group, name, *run(group, name)))
                 print(*rows[-1], sep=" | ", flush=True)
     print("\n| group | client | result | seconds | what it did |\n| --- | --- | --- | --- | --- |")

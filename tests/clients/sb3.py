@@ -31,4 +31,6 @@ if __name__ == "__main__":
     PPO("MlpPolicy", filmed, n_steps=32, device="cpu").learn(64)
     filmed.close()
     assert list(Path("sb3").glob("*.mp4"))
-    print(f"Stable-Baselines3 {stable_baselines3.__version__}: check_env, PPO, SAC, TD3, SubprocVecEnv, VecVideoRecorder")
+    print(
+        f"Stable-Baselines3 {stable_baselines3.__version__}: check_env, PPO, SAC, TD3, SubprocVecEnv, VecVideoRecorder"
+    )

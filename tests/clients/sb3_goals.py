@@ -11,7 +11,7 @@ import ccr_gym  # noqa: F401 - registers the ids
 IDS = ("CCR/PushObstacle-v1", "CCR/SpatialPush-v1")
 for env_id in IDS:
     for kwargs in ({}, {"task": {"force_vector": True}}) if "Spatial" in env_id else ({},):
-        check_env(gymnasium.make(env_id, obs_mode="goal", **kwargs), skip_render_check=True)
+        check_env(gymnasium.make(env_id, obs_mode="goal", **kwargs).unwrapped, skip_render_check=True)
         envs = make_vec_env(env_id, 2, seed=0, env_kwargs={"obs_mode": "goal", **kwargs})
         SAC(
             "MultiInputPolicy",
@@ -22,4 +22,4 @@ for env_id in IDS:
             replay_buffer_kwargs={"n_sampled_goal": 4, "goal_selection_strategy": "future"},
             device="cpu",
         ).learn(500)
-print(f"Stable-Baselines3 {stable_baselines3.__version__}: SAC with HerReplayBuffer on {', '.join(IDS)}")
+print(f"SB3 {stable_baselines3.__version__}: SAC with HerReplayBuffer on {', '.join(IDS)}")

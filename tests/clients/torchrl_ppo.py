@@ -4,7 +4,7 @@ import torch
 import torchrl
 from tensordict.nn import NormalParamExtractor, TensorDictModule
 from torch import nn
-from torchrl.collectors import SyncDataCollector
+from torchrl.collectors import Collector
 from torchrl.envs import GymEnv, ParallelEnv, RewardSum, StepCounter, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 from torchrl.modules import ProbabilisticActor, TanhNormal, ValueOperator
@@ -24,11 +24,12 @@ def train(env_id: str) -> None:
     inputs, outputs = env.observation_spec["observation"].shape[-1], env.action_spec.shape[-1]
     body = nn.Sequential(nn.Linear(inputs, 64), nn.Tanh(), nn.Linear(64, 2 * outputs), NormalParamExtractor())
     module = TensorDictModule(body, in_keys=["observation"], out_keys=["loc", "scale"])
-    actor = ProbabilisticActor(module, env.action_spec, ["loc", "scale"], distribution_class=TanhNormal, return_log_prob=True)
+    kwargs = {"distribution_class": TanhNormal, "return_log_prob": True}
+    actor = ProbabilisticActor(module, env.action_spec, ["loc", "scale"], **kwargs)
     critic = ValueOperator(nn.Sequential(nn.Linear(inputs, 64), nn.Tanh(), nn.Linear(64, 1)), in_keys=["observation"])
     advantage, loss = GAE(gamma=0.99, lmbda=0.95, value_network=critic), ClipPPOLoss(actor, critic)
     optimizer = torch.optim.Adam(loss.parameters(), 1e-3)
-    for data in SyncDataCollector(env, actor, frames_per_batch=128, total_frames=256):
+    for data in Collector(env, actor, frames_per_batch=128, total_frames=256):
         assert data["next", "tension"].isfinite().all()
         advantage(data)
         terms = loss(data)
