@@ -51,8 +51,6 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         ValueError: If an argument is out of range; the message names the bound.
     """
 
-    compute_reward = staticmethod(compute_reward)
-
     def __init__(
         self,
         task: AnyTask,
@@ -84,6 +82,8 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         self._steps = np.zeros(num_envs, int)
         self._ended = np.zeros(num_envs, bool)
         self._started = False
+        if self.settings.obs_mode == "goal":  # as the single environments
+            self.compute_reward = compute_reward
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None

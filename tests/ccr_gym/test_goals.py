@@ -29,6 +29,13 @@ def test_rewards_follow_from_the_goals(env_id):
     assert env.compute_reward(np.array([[0.2], [0.3]]), np.array([[0.2], [0.2]])) == pytest.approx([0, -0.5])
 
 
+@pytest.mark.parametrize("obs_mode", ["flat", "dict"])
+def test_other_forms_are_not_taken_for_goal_conditioned_ones(obs_mode):
+    check_env(gymnasium.make("CCR/PushObstacle-v1", obs_mode=obs_mode).unwrapped)
+    envs = gymnasium.make_vec("CCR/PushObstacle-v1", 2, vectorization_mode="vector_entry_point", obs_mode=obs_mode)
+    assert not hasattr(envs, "compute_reward")
+
+
 def test_vector_environments_agree_with_single_ones():
     modes = ("vector_entry_point", "sync")
     envs = [

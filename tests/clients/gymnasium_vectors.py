@@ -19,7 +19,7 @@ WRAPPERS = {
     "TransformReward": lambda envs: vector.TransformReward(envs, lambda rewards: 2 * rewards),
     "TransformObservation": lambda envs: vector.TransformObservation(envs, lambda rows: 2 * rows),
     "RescaleObservation": lambda envs: vector.RescaleObservation(envs, -2, 2),
-    "RescaleAction": lambda envs: vector.RescaleAction(envs, -3.0, 3.0),
+    "RescaleAction": lambda envs: vector.RescaleAction(envs, np.float32(-3), np.float32(3)),
     "ClipAction": vector.ClipAction,
     "ClipReward": lambda envs: vector.ClipReward(envs, -1, 1),
     "DtypeObservation": lambda envs: vector.DtypeObservation(envs, "float64"),

@@ -4,6 +4,7 @@ import warnings
 from pathlib import Path
 
 import gymnasium
+import numpy as np
 from gymnasium import wrappers
 from gymnasium.utils.env_checker import check_env
 
@@ -18,7 +19,7 @@ WRAPPERS = {
     "TransformReward": lambda env: wrappers.TransformReward(env, lambda reward: 2 * reward),
     "TransformObservation": lambda env: wrappers.TransformObservation(env, lambda row: row, env.observation_space),
     "RescaleObservation": lambda env: wrappers.RescaleObservation(env, -2, 2),
-    "RescaleAction": lambda env: wrappers.RescaleAction(env, -3.0, 3.0),
+    "RescaleAction": lambda env: wrappers.RescaleAction(env, np.float32(-3), np.float32(3)),
     "ClipAction": wrappers.ClipAction,
     "ClipReward": lambda env: wrappers.ClipReward(env, -1, 1),
     "StickyAction": lambda env: wrappers.StickyAction(env, 0.3),
