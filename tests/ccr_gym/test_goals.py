@@ -7,6 +7,7 @@ from stable_baselines3.common.env_checker import check_env
 
 import ccr_gym
 from ccr_gym import FORCE_SPAN
+from ccr_gym.goals import compute_reward
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 
@@ -27,6 +28,12 @@ def test_rewards_follow_from_the_goals(env_id):
         wanted = -min(abs(force - info["desired_force"]) / info["desired_force"], 1)
         assert reward == pytest.approx(wanted, abs=1e-5)
     assert env.compute_reward(np.array([[0.2], [0.3]]), np.array([[0.2], [0.2]])) == pytest.approx([0, -0.5])
+
+
+def test_goals_may_be_zero():
+    achieved, desired = np.array([[0.0], [0.1], [0.1]], np.float32), np.array([[0.0], [0.0], [0.2]], np.float32)
+    assert compute_reward(achieved, desired).tolist() == [0, -1, -0.5]
+    assert compute_reward(achieved[0], desired[0]).shape == ()
 
 
 @pytest.mark.parametrize("obs_mode", ["flat", "dict"])

@@ -22,7 +22,6 @@ WRAPPERS = {
     "RescaleAction": lambda envs: vector.RescaleAction(envs, np.float32(-3), np.float32(3)),
     "ClipAction": vector.ClipAction,
     "ClipReward": lambda envs: vector.ClipReward(envs, -1, 1),
-    "DtypeObservation": lambda envs: vector.DtypeObservation(envs, "float64"),
     "DictInfoToList": vector.DictInfoToList,
     "NumpyToTorch": vector.NumpyToTorch,
     "RecordVideo": lambda envs: vector.RecordVideo(envs, "vectors", episode_trigger=lambda _: True),

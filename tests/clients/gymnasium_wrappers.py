@@ -26,7 +26,6 @@ WRAPPERS = {
     "DelayObservation": lambda env: wrappers.DelayObservation(env, 2),
     "TimeAwareObservation": wrappers.TimeAwareObservation,
     "TimeLimit": lambda env: wrappers.TimeLimit(env, 10),
-    "DtypeObservation": lambda env: wrappers.DtypeObservation(env, "float64"),
     "Autoreset": wrappers.Autoreset,
     "RenderCollection": wrappers.RenderCollection,
     "HumanRendering": wrappers.HumanRendering,

@@ -1,6 +1,7 @@
 """Runs every client of the matrix in the environment of its group, and prints a table: ``make clients``."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -46,13 +47,14 @@ def main(wanted: list[str]) -> int:
 
 def run(group: str, name: str) -> tuple[str, str, str]:
     """Return result, seconds, and the last line that a client printed: what it did, or its error."""
-    scratch = BUILD / group / "runs"
-    scratch.mkdir(parents=True, exist_ok=True)
+    scratch = BUILD / group / "runs" / name
+    shutil.rmtree(scratch, ignore_errors=True)
+    scratch.mkdir(parents=True)
     command = [str(BUILD / group / "bin" / "python"), str(HERE / f"{name}.py")]
     # One thread each; no display; data sets and pictures go to the build folder.
     settings = {"OMP_NUM_THREADS": "1", "SDL_VIDEODRIVER": "dummy", "MINARI_DATASETS_PATH": str(BUILD / "minari")}
     start = time.perf_counter()
-    with open(scratch / f"{name}.log", "w+") as log:
+    with open(scratch / "log", "w+") as log:
         try:
             code = subprocess.run(
                 command, cwd=scratch, env=os.environ | settings, stdout=log, stderr=log, timeout=60 * MINUTES
