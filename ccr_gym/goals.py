@@ -23,6 +23,6 @@ def compute_reward(achieved_goal: np.ndarray, desired_goal: np.ndarray, info: An
         info: Not used.
     """
     error, desired = achieved_goal.astype(float) - desired_goal, desired_goal.astype(float)
-    error, desired = np.linalg.norm(error, axis=-1), np.linalg.norm(desired, axis=-1)
-    relative = np.divide(error, desired, out=np.array(error > 0, float), where=desired > 0)
+    distance, size = np.linalg.norm(error, axis=-1), np.linalg.norm(desired, axis=-1)
+    relative = np.divide(distance, size, out=np.array(distance > 0, float), where=size > 0)
     return np.asarray(-np.minimum(relative, 1.0))

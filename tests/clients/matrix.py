@@ -62,6 +62,8 @@ def run(group: str, name: str) -> tuple[str, str, str]:
         except subprocess.TimeoutExpired:
             print(f"stopped after {MINUTES} minutes", file=log, flush=True)
             code = 1
+        if code < 0:
+            print(f"ended by signal {-code}", file=log, flush=True)
         log.seek(0)
         said = [line.strip() for line in log if line.strip()] or ["nothing"]
     result = "FAILED" if code else "ok"
