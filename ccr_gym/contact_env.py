@@ -246,7 +246,8 @@ def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others:
     check_task(task)
     settings_class = task.adapter.settings_class
     make: Callable[..., AnySettings] = settings_class  # which checks the types itself
-    check_names(name, given, [*others, *(declared.name for declared in fields(settings_class))])
+    valid = [*others, *(declared.name for declared in fields(settings_class))]
+    check_names(name, given, valid, "got an unexpected keyword argument")  # Python's words, which TorchRL looks for
     return make(**given)
 
 

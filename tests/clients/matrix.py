@@ -54,18 +54,19 @@ def run(group: str, name: str) -> tuple[str, str, str]:
     # One thread each; no display; data sets and pictures go to the build folder.
     settings = {"OMP_NUM_THREADS": "1", "SDL_VIDEODRIVER": "dummy", "MINARI_DATASETS_PATH": str(BUILD / "minari")}
     start = time.perf_counter()
-    with open(scratch / "log", "w+") as log:
+    with open(scratch / "out", "w+") as out, open(scratch / "log", "w+") as log:
         try:
             code = subprocess.run(
-                command, cwd=scratch, env=os.environ | settings, stdout=log, stderr=log, timeout=60 * MINUTES
+                command, cwd=scratch, env=os.environ | settings, stdout=out, stderr=log, timeout=60 * MINUTES
             ).returncode
         except subprocess.TimeoutExpired:
             print(f"stopped after {MINUTES} minutes", file=log, flush=True)
             code = 1
         if code < 0:
             print(f"ended by signal {-code}", file=log, flush=True)
-        log.seek(0)
-        said = [line.strip() for line in log if line.strip()] or ["nothing"]
+        shown = log if code else out
+        shown.seek(0)
+        said = [line.strip() for line in shown if line.strip()] or ["nothing"]
     result = "FAILED" if code else "ok"
     return result, f"{time.perf_counter() - start:.0f}", said[-1].replace("|", "/")[:200]
 
