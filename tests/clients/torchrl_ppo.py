@@ -25,7 +25,7 @@ def train(env_id: str) -> None:
     body = nn.Sequential(nn.Linear(inputs, 64), nn.Tanh(), nn.Linear(64, 2 * outputs), NormalParamExtractor())
     module = TensorDictModule(body, in_keys=["observation"], out_keys=["loc", "scale"])
     kwargs = {"distribution_class": TanhNormal, "return_log_prob": True}
-    actor = ProbabilisticActor(module, env.action_spec, ["loc", "scale"], **kwargs)
+    actor = ProbabilisticActor(module, in_keys=["loc", "scale"], spec=env.action_spec, **kwargs)
     critic = ValueOperator(nn.Sequential(nn.Linear(inputs, 64), nn.Tanh(), nn.Linear(64, 1)), in_keys=["observation"])
     advantage, loss = GAE(gamma=0.99, lmbda=0.95, value_network=critic), ClipPPOLoss(actor, critic)
     optimizer = torch.optim.Adam(loss.parameters(), 1e-3)
