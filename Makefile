@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test coverage lint native sanitize address thread bench instructions soak clean
+.PHONY: demo test coverage lint native sanitize address thread bench instructions soak clients clean
 
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
@@ -12,6 +12,9 @@ CXX_FILES = $(shell git ls-files "*.cpp" "*.hpp" "*.inc")
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 SEED ?= 1
 FUZZ ?= 45
+CLIENTS ?= core rllib tianshou d3rlpy
+WHEELS = build/clients/wheels
+KERNEL_SOURCES = CMakeLists.txt $(wildcard solver/native/* solver/native/*/*) solver/common/gap_laws.py solver/planar/formulation.py solver/spatial/arc.py solver/spatial/formulation.py solver/codegen.py
 
 demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controllers, write figures and videos to runs/demo
 	$(BIN)/ccr-gym train --run runs/demo
@@ -57,9 +60,23 @@ soak: $(INSTALL)
 	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
 	$(BIN)/python -m pytest -k fuzz --hypothesis-profile=default
 
-$(INSTALL): pyproject.toml CMakeLists.txt constraints.txt $(wildcard solver/native/* solver/native/*/*) solver/common/gap_laws.py solver/planar/formulation.py solver/spatial/arc.py solver/spatial/formulation.py solver/codegen.py
+$(INSTALL): pyproject.toml constraints.txt $(KERNEL_SOURCES)
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+clients: $(CLIENTS:%=build/clients/%/.installed)  ## what learns on these environments, in a virtual environment for each group of pins
+	$(PYTHON) tests/clients/matrix.py $(CLIENTS)
+
+build/clients/%/.installed: tests/clients/requirements-%.txt $(WHEELS)/.built
+	test -d build/clients/$* || $(PYTHON) -m venv build/clients/$*
+	build/clients/$*/bin/python -m pip uninstall --quiet --yes ccr-gym
+	build/clients/$*/bin/python -m pip install --quiet --requirement $< $(if $(filter d3rlpy,$*),,"$$(echo $(WHEELS)/*.whl)[render]")
+	touch $@
+
+$(WHEELS)/.built: pyproject.toml $(KERNEL_SOURCES) $(wildcard solver/*.py solver/*/*.py ccr_gym/*.py ccr_gym/*/*.py)
+	rm -rf $(WHEELS)
+	$(PYTHON) -m pip wheel --quiet --no-deps --wheel-dir $(WHEELS) .
 	touch $@
 
 clean:

@@ -268,7 +268,7 @@ def check_instance(
     return value
 
 
-def check_names(name: str, given: Mapping[str, object], valid: Sequence[str]) -> None:
+def check_names(name: str, given: Mapping[str, object], valid: Sequence[str], refused: str = "does not take") -> None:
     """Raise an error if a mapping has keys other than the valid names.
 
     Raises:
@@ -276,7 +276,7 @@ def check_names(name: str, given: Mapping[str, object], valid: Sequence[str]) ->
     """
     unknown = [shown(key) for key in given if not (isinstance(key, str) and key in valid)]
     if unknown:
-        raise TypeError(f"{name} does not take {', '.join(unknown)}; it takes {', '.join(valid)}")
+        raise TypeError(f"{name} {refused} {', '.join(unknown)}; it takes {', '.join(valid)}")
 
 
 def check_array(name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:

@@ -59,6 +59,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             self.compute_reward = compute_reward
         self.observation_space, self.action_space = single_spaces(self._episodes, self.settings)
         self._shape = (self.action_spec.size,)
+        if self.settings.obs_mode == "goal":  # clients take an environment that has it for a goal-conditioned one
+            self.compute_reward = compute_reward
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observation, Info]:
         """Start an episode with the straight robot and a new scene and set-point.
@@ -246,7 +248,8 @@ def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others:
     check_task(task)
     settings_class = task.adapter.settings_class
     make: Callable[..., AnySettings] = settings_class  # which checks the types itself
-    check_names(name, given, [*others, *(declared.name for declared in fields(settings_class))])
+    valid = [*others, *(declared.name for declared in fields(settings_class))]
+    check_names(name, given, valid, "got an unexpected keyword argument")  # Python's words, which TorchRL looks for
     return make(**given)
 
 

@@ -15,10 +15,14 @@ def goal_space(flat: spaces.Box, size: int) -> spaces.Dict:
 def compute_reward(achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Any = None) -> np.ndarray:
     """Return ``−min(|F − F_d| / |F_d|, 1)``, the reward of goal-conditioned environments, ``(...)``.
 
+    Relabelled goals may be zero, those of a robot without contact: then it is 0 without a force, and −1 with one.
+
     Args:
         achieved_goal: Forces F, ``(..., 1)`` or ``(..., d)``, in any unit.
         desired_goal: Set-points F_d, likewise.
         info: Not used.
     """
     error, desired = achieved_goal.astype(float) - desired_goal, desired_goal.astype(float)
-    return np.asarray(-np.minimum(np.linalg.norm(error, axis=-1) / np.linalg.norm(desired, axis=-1), 1.0))
+    distance, size = np.linalg.norm(error, axis=-1), np.linalg.norm(desired, axis=-1)
+    relative = np.divide(distance, size, out=np.array(distance > 0, float), where=size > 0)
+    return np.asarray(-np.minimum(relative, 1.0))

@@ -7,6 +7,7 @@ from stable_baselines3.common.env_checker import check_env
 
 import ccr_gym
 from ccr_gym import FORCE_SPAN
+from ccr_gym.goals import compute_reward
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 
@@ -27,6 +28,19 @@ def test_rewards_follow_from_the_goals(env_id):
         wanted = -min(abs(force - info["desired_force"]) / info["desired_force"], 1)
         assert reward == pytest.approx(wanted, abs=1e-5)
     assert env.compute_reward(np.array([[0.2], [0.3]]), np.array([[0.2], [0.2]])) == pytest.approx([0, -0.5])
+
+
+def test_goals_may_be_zero():
+    achieved, desired = np.array([[0.0], [0.1], [0.1]], np.float32), np.array([[0.0], [0.0], [0.2]], np.float32)
+    assert compute_reward(achieved, desired).tolist() == [0, -1, -0.5]
+    assert compute_reward(achieved[0], desired[0]).shape == ()
+
+
+@pytest.mark.parametrize("obs_mode", ["flat", "dict"])
+def test_other_forms_are_not_taken_for_goal_conditioned_ones(obs_mode):
+    check_env(gymnasium.make("CCR/PushObstacle-v1", obs_mode=obs_mode).unwrapped)
+    envs = gymnasium.make_vec("CCR/PushObstacle-v1", 2, vectorization_mode="vector_entry_point", obs_mode=obs_mode)
+    assert not hasattr(envs, "compute_reward")
 
 
 def test_vector_environments_agree_with_single_ones():

@@ -121,7 +121,7 @@ def test_invalid_settings_are_refused(kwargs, message):
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [
-        ({"forse_limit": 1.0}, "does not take 'forse_limit'; it takes task, .*, force_limit, "),
+        ({"forse_limit": 1.0}, "got an unexpected keyword argument 'forse_limit'; it takes task, .*, force_limit, "),
         ({"task": {"forse": (0.1, 0.2)}}, "task does not take 'forse'; it takes x, y, radius, force"),
         ({"weights": {"forse_error": 1.0}}, "weights does not take 'forse_error'; it takes force_error, "),
         ({"sensing": {"latenzy": (1, 2)}}, "sensing does not take 'latenzy'; it takes latency, "),
