@@ -59,8 +59,6 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             self.compute_reward = compute_reward
         self.observation_space, self.action_space = single_spaces(self._episodes, self.settings)
         self._shape = (self.action_spec.size,)
-        if self.settings.obs_mode == "goal":  # clients take an environment that has it for a goal-conditioned one
-            self.compute_reward = compute_reward
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observation, Info]:
         """Start an episode with the straight robot and a new scene and set-point.
@@ -92,7 +90,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self._started = True
         self._film(None)
         reading = self._episodes.read(0)
-        return self._observation(reading), self._episodes.infos(reading, (0.0,) * len(TERMS), 0)
+        return self._observation(reading), _numpy(self._episodes.infos(reading, (0.0,) * len(TERMS), 0))
 
     def step(self, action: np.ndarray) -> tuple[Observation, SupportsFloat, bool, bool, Info]:
         """Move the cables by ``action · max_increment_mm``, as far as tension limit and obstacles allow.
@@ -109,7 +107,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         terms = tuple(map(float, episodes.rewards(reading, 0)))
         reward = float(episodes.total_reward(reading, terms, 0))
         self._film(reward)
-        return self._observation(reading), reward, False, False, episodes.infos(reading, terms, 0)
+        return self._observation(reading), reward, False, False, _numpy(episodes.infos(reading, terms, 0))
 
     def render(self) -> np.ndarray | None:
         """Return a picture, ``(H, W, 3)`` uint8, or show it in a window: robot, obstacles, forces and set-point."""
@@ -251,6 +249,11 @@ def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others:
     valid = [*others, *(declared.name for declared in fields(settings_class))]
     check_names(name, given, valid, "got an unexpected keyword argument")  # Python's words, which TorchRL looks for
     return make(**given)
+
+
+def _numpy(infos: Info) -> Info:
+    """Return infos whose numbers have a dtype, which some clients look at."""
+    return {key: np.asarray(value)[()] for key, value in infos.items()}
 
 
 def _given_assignment(options: Info | None, task: AnyTask, scales: Scales) -> Assignment | None:

@@ -167,7 +167,7 @@ def test_none_and_empty_mappings_mean_the_defaults(env_id, given):
         ({"max_episode_steps": True}, "max_episode_steps is True"),
         ({"autoreset_mode": "nextstep"}, "autoreset_mode is 'nextstep'; it must be 'NextStep' or"),
         ({"autoreset_mode": 0}, "autoreset_mode is 0"),
-        ({"render_mode": "rgb_array"}, "render_mode is 'rgb_array'; use vectorization_mode='sync'"),
+        ({"render_mode": "human"}, "render_mode is 'human'; it must be 'rgb_array'"),
     ],
 )
 def test_invalid_vector_arguments_are_refused(kwargs, message):

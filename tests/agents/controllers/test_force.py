@@ -16,7 +16,7 @@ def test_with_ideal_sensing_it_reaches_the_set_point(env_id, kind):
 
 
 def test_it_searches_until_something_touches_and_forgets():
-    controller, goal = ForceController(), np.array([0.3], np.float32)
+    controller, goal, cable = ForceController(), np.array([0.3], np.float32), np.zeros(1, np.float32)
     cable = np.zeros(1, np.float32)
 
     def sensor(force):
@@ -34,7 +34,7 @@ def test_it_searches_until_something_touches_and_forgets():
 
 
 def test_what_the_sensor_reads_without_contact_is_taken_off():
-    controller, goal = ForceController(), np.array([0.3], np.float32)
+    controller, goal, cable = ForceController(), np.array([0.3], np.float32), np.zeros(1, np.float32)
     for reading, touching in (([0.02, -0.01], 0.0), ([0.04, -0.03], 0.0), ([0.03, 0.28], 1.0)):
         seen = {
             "force_measured": np.array(reading, np.float32),
