@@ -84,6 +84,9 @@ class ContactProblem {
   // `obstacles` is the number of obstacles of every scene.
   ContactProblem(const Robot& robot, int obstacles);
 
+  // Switches to a robot with the same numbers of segments, cables and points; obstacles are to be set again.
+  void set_robot(const Robot& robot);
+
   // Switches to another scene with the same number of obstacles. The span must outlive its use.
   void set_obstacles(std::span<const Obstacle> obstacles);
 
@@ -211,8 +214,8 @@ class ContactProblem {
   double largest_motion_ = 0;
   double part_ = 0;                // of the way, where they are
   std::vector<Obstacle> passing_;  // there
-  double farthest_line_ = 0;  // distance of a line of points from the backbone
-  double reach_ = 0;          // distance of a node from an obstacle within which its points are measured
+  double farthest_line_ = 0;       // distance of a line of points from the backbone
+  double reach_ = 0;               // distance of a node from an obstacle within which its points are measured
   double energy_ = 0;
   double loaded_ = 1;      // part of the loads that act
   double load_slope_ = 0;  // bound on the slope of their work in a control

@@ -34,6 +34,10 @@ class Continuation {
 
   virtual const BlockLayout& layout() const = 0;
 
+  // Switches to another robot of the same layout; `set_obstacles` must follow. Results are those of a continuation made
+  // for it.
+  virtual void set_robot(const Robot& robot) = 0;
+
   // Switches to another scene with the same number of obstacles. The span must outlive its use.
   virtual void set_obstacles(std::span<const Obstacle<D>> obstacles) = 0;
 
@@ -52,8 +56,8 @@ class Continuation {
   virtual StepResult move(const double* from, const double* target, std::span<const Obstacle<D>> towards,
                           std::span<const double> motions, double* to) = 0;
 
-  // The same as `follow`, appending every accepted shape to `shapes`: three numbers of each node, the points that can touch, and
-  // the displacements of the obstacles.
+  // The same as `follow`, appending every accepted shape to `shapes`: three numbers of each node, the points that can
+  // touch, and the displacements of the obstacles.
   virtual StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) = 0;
 
   // Returns whether a ramp gets to its contact force without an event on the way; false as well where the robot at rest
