@@ -22,7 +22,6 @@ from solver.common.validation import (
     check_instance,
     check_positive,
     check_whole,
-    shown,
 )
 
 EquilibriumT_co = TypeVar("EquilibriumT_co", bound=BaseEquilibrium[AnyRobot], covariant=True)
@@ -86,7 +85,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
     def _straight_points(self, robot: Any) -> np.ndarray:
         """Return the points of a straight robot that can touch, ``(p, k, d)`` [mm]."""
 
-    def assign(self, index: int, scene: Scene, robot: RobotT_co | None = None) -> None:  # type: ignore[misc]
+    def assign(self, index: int, scene: Scene, robot: RobotT_co | None = None) -> None:
         """Assign a scene to a robot, which must then be brought to rest by :meth:`rest` before it moves.
 
         A scene and a robot equal to the present ones change nothing.
@@ -120,7 +119,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             self._scenes[index] = scene
             self._unrested.add(index)
 
-    def leaves_clear(self, scene: Scene, robot: RobotT_co | None = None) -> bool:  # type: ignore[misc]
+    def leaves_clear(self, scene: Scene, robot: RobotT_co | None = None) -> bool:
         """Return whether no obstacle of a scene overlaps the straight robot, that of the batch where none is given.
 
         Raises:
@@ -164,8 +163,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         """
         indices = self._all if robots is None else self._check_indices(robots)
         shape = (len(indices),) if self.cables == 1 else (len(indices), self.cables)
-        low, high = (ends.reshape(len(indices), *[1] * (len(shape) - 1)) for ends in self._limits[indices, :2].T)
-        commands = check_array("cable_mm", cable_mm, shape, low, high, self._bound(indices))
+        commands = check_array("cable_mm", cable_mm, shape, *self._cable_bounds(indices))
         motions = self._motions(indices, scenes)
         with self._exclusive:
             self._check_rested(indices)
@@ -210,7 +208,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             np.column_stack([np.tile(cable[:, None], self.cables), length])
             for cable, length in ((least, shortest), (most, longest))
         )
-        bound = f"{self._bound(self._all)}, and lengths from {shortest.min():.6g} to {longest.max():.6g}"
+        bound = f"{self._cable_bounds(self._all)[-1]}, and lengths from {shortest.min():.6g} to {longest.max():.6g}"
         commands = check_array("commands", commands, self.commands.shape, low, high, bound)
         with self._exclusive:
             self._check_rested(self._all)
@@ -291,25 +289,6 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         work = int(self.iterations[index]), int(self.factorizations[index])
         block, status = self.blocks[index].copy(), Status(self.statuses[index])
         return self._make_equilibrium(self.robot_of(index), scene, block, status, *work)
-
-    def _check_lengths(self, robots: list[int]) -> None:
-        """Check the lengths in blocks, which users may have written to."""
-        lengths, limits = self.blocks[:, self.layout.length.at], self._limits
-        if robots is not self._all:
-            lengths, limits = lengths[robots], limits[robots]
-        low, high = limits[:, 2], limits[:, 3]
-        if not ((low <= lengths) & (lengths <= high)).all():
-            raise ValueError(
-                f"lengths in blocks are {shown(lengths)}; all must be from {low.min():.6g} to {high.max():.6g}: "
-                "call rest(robots)"
-            )
-
-    def _bound(self, robots: list[int]) -> str:
-        """Return the bound of the cable displacements of some robots as text."""
-        limits = self._limits[robots] if robots else self._limits
-        if (limits == limits[0]).all():
-            return f"from {limits[0, 0]:.6g} to {limits[0, 1]:.6g} (robot.max_cable_mm)"
-        return "from least_cable_mm to max_cable_mm of each robot (robot_of(index))"
 
     def _straight_gaps(self, robot: Any, scene: Scene) -> np.ndarray:
         points = self._straight.get(robot)

@@ -81,6 +81,9 @@ class RowBatch(ABC, Generic[RobotT_co]):
         self._robots: list[RobotT_co | None] = [None] * count  # those that differ from the batch's
         self._scenes: list[Scene | None] = [None] * count
         self._limits = np.tile(_limits(robot), (count, 1))  # of each robot, as _limits returns them
+        self._others: set[int] = set()  # whose robots differ from the batch's
+        least, most, *_ = _limits(robot)
+        self._bounds = least, most, f"from {least:.6g} to {most:.6g} (robot.max_cable_mm)"
         self._all = list(range(count))
         self._unrested = set(self._all)  # must be brought to rest before they move
         self._exclusive = ExclusiveUse()
@@ -119,8 +122,9 @@ class RowBatch(ABC, Generic[RobotT_co]):
         with self._exclusive:
             numbers = [getattr(self, name)[indices] for name in NUMBERS]
             rested = np.array([index not in self._unrested for index in indices], bool)
-            robots, scenes = (tuple(of[index] for index in indices) for of in (self._robots, self._scenes))
-            return Rows(self.robot, robots, scenes, rested, *numbers)
+            own = tuple(self._robots[index] for index in indices)
+            scenes = tuple(self._scenes[index] for index in indices)
+            return Rows(self.robot, own, scenes, rested, *numbers)
 
     def set_rows(self, robots: Sequence[int], rows: Rows) -> None:
         """Put robots into states of :meth:`get_rows`, from which they go on as those robots would, bit for bit.
@@ -141,16 +145,16 @@ class RowBatch(ABC, Generic[RobotT_co]):
         entries = list(zip(indices, rows.robots, rows.scenes, rows.rested.tolist(), strict=True))
         changed = [entry[:3] for entry in entries if entry[1:3] != (self._robots[entry[0]], self._scenes[entry[0]])]
         others = {robot for index, robot, _ in changed if robot is not None and robot != self._robots[index]}
-        for robot in others:
-            self._check_own(robot)
+        for other in others:
+            self._check_own(other)
         places = {(robot, scene) for _, robot, scene in changed if scene is not None}
         compiled = {(robot, scene): self._compile(robot or self.robot, scene) for robot, scene in places}
-        made = {robot: self._kernel_robot(robot) for robot in others}
+        made = {other: self._kernel_robot(other) for other in others}
         with self._exclusive:
             for index, robot, scene in changed:
                 if scene is not None:
                     self._kernel_batch.set_obstacles(index, compiled[robot, scene])
-                self._become(index, robot, made.get(robot))
+                self._become(index, robot, None if robot is None else made.get(robot))
                 self._scenes[index] = scene
             for index, _, scene, rested in entries:
                 (self._unrested.discard if rested and scene is not None else self._unrested.add)(index)
@@ -162,6 +166,7 @@ class RowBatch(ABC, Generic[RobotT_co]):
         if robot != self._robots[index]:
             self._kernel_batch.set_robot(index, made)
             self._robots[index], self._limits[index] = robot, _limits(robot or self.robot)
+            (self._others.discard if robot is None else self._others.add)(index)
 
     def _check_own(self, robot: AnyRobot) -> None:
         """Check that a robot can be one of this batch.
@@ -252,6 +257,25 @@ class RowBatch(ABC, Generic[RobotT_co]):
         if scene is None:
             raise ValueError(f"robot {index} has no scene; call assign({index}, scene)")
         return scene
+
+    def _cable_bounds(self, robots: list[int]) -> tuple[Any, Any, str]:
+        """Return least and largest displacements of the cables of some robots, and the bound as text."""
+        if not self._others or self._others.isdisjoint(robots):
+            return self._bounds
+        least, most = (ends if self.cables == 1 else ends[:, None] for ends in self._limits[robots, :2].T)
+        return least, most, "from least_cable_mm to max_cable_mm of each robot (robot_of(index))"
+
+    def _check_lengths(self, robots: list[int]) -> None:
+        """Check the lengths in blocks, which users may have written to."""
+        lengths, limits = self.blocks[:, self.layout.length.at], self._limits
+        if robots is not self._all:
+            lengths, limits = lengths[robots], limits[robots]
+        low, high = limits[:, 2], limits[:, 3]
+        if not ((low <= lengths) & (lengths <= high)).all():
+            raise ValueError(
+                f"lengths in blocks are {shown(lengths)}; all must be from {low.min():.6g} to {high.max():.6g}: "
+                "call rest(robots)"
+            )
 
     def _check_index(self, index: object) -> int:
         if type(index) is int and 0 <= index < self.count:
