@@ -1,5 +1,6 @@
-"""Base class of batches: many equal robots, each in its own scene, moved by one call of the kernel."""
+"""Base class of batches: many robots of one layout, each in its own scene, moved by one call of the kernel."""
 
+import math
 import os
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -21,7 +22,6 @@ from solver.common.validation import (
     check_instance,
     check_positive,
     check_whole,
-    shown,
 )
 
 EquilibriumT_co = TypeVar("EquilibriumT_co", bound=BaseEquilibrium[AnyRobot], covariant=True)
@@ -51,7 +51,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         commands: Cable displacements and length that each robot is moved to, ``(N, cables + 1)`` [mm].
 
     Args:
-        robot: The robot that all of them are.
+        robot: The robot that all of them are but those that :meth:`assign` gives a robot of their own.
         count: Number N of robots.
         obstacles: Number of obstacles in every scene.
         threads: Threads that share the work; results do not depend on their number.
@@ -68,57 +68,68 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         threads = check_whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "more do not help")
         RowBatch.__init__(self, robot, count, self._make_layout(robot, obstacles), threads)
         self._work = self.statuses, self.iterations, self.factorizations
-        self._clear: Scene | None = None  # last scene found to leave the straight robot clear
-        self._straight: np.ndarray | None = None  # points of the straight robot, computed on first use
-        least, most = robot.least_cable_mm, robot.cable_limit_mm
-        self._low = np.array(self.cables * [least] + [robot.shortest_mm])
-        self._high = np.array(self.cables * [most] + [robot.longest_mm])
-        self._bound = f"from {least:.6g} to {most:.6g} (robot.max_cable_mm)"
+        self._clear: tuple[Any, Scene] | None = None  # last robot, straight, found to be left clear by a scene
+        self._straight: dict[Any, np.ndarray] = {}  # points of the batch's robot, straight, and of the last other one
 
     @abstractmethod
     def _make_layout(self, robot: Any, obstacles: int) -> Layout:
         """Return the memory layout of a block of a robot."""
 
     @abstractmethod
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> EquilibriumT_co:
+    def _make_equilibrium(
+        self, robot: Any, scene: Scene, block: np.ndarray, status: Status, *work: int
+    ) -> EquilibriumT_co:
         """Return the equilibrium of a block."""
 
     @abstractmethod
-    def _straight_points(self) -> np.ndarray:
-        """Return the points of the straight robot that can touch, ``(p, k, d)`` [mm]."""
+    def _straight_points(self, robot: Any) -> np.ndarray:
+        """Return the points of a straight robot that can touch, ``(p, k, d)`` [mm]."""
 
-    def assign(self, index: int, scene: Scene) -> None:
+    def assign(self, index: int, scene: Scene, robot: RobotT_co | None = None) -> None:
         """Assign a scene to a robot, which must then be brought to rest by :meth:`rest` before it moves.
 
-        A scene equal to the robot's present one changes nothing.
+        A scene and a robot equal to the present ones change nothing.
+
+        Args:
+            index: Index of the robot.
+            scene: Its obstacles.
+            robot: What the robot is from now on, with the model and the numbers of segments, cables, lines and
+                positions of the batch's robot; everything else may differ. ``None`` for the batch's robot.
 
         Raises:
-            ValueError: As :class:`solver.Solver`, or if the scene does not have the batch's number of obstacles;
-                nothing has changed then.
-            TypeError: If ``scene`` is not a scene.
+            ValueError: As :class:`solver.Solver`, or if scene or robot do not have the numbers of the batch; nothing
+                has changed then.
+            TypeError: If ``scene`` is not a scene, or ``robot`` not one of the batch's space.
         """
-        index = self._check_index(index)
+        index, own = self._check_index(index), None if robot == self.robot else robot
         check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
-        if scene == self._scenes[index]:
+        if (own, scene) == (self._robots[index], self._scenes[index]):
             return
-        compiled = self._compile(scene)
-        if scene is not self._clear:
-            check_clear(self.robot, scene, self._straight_gaps(scene))
+        changes = own != self._robots[index]
+        if changes and own is not None:
+            self._check_own(own)
+        robot = own or self.robot
+        compiled = self._compile(robot, scene)
+        if self._clear is None or robot is not self._clear[0] or scene is not self._clear[1]:
+            check_clear(robot, scene, self._straight_gaps(robot, scene))
+        made = self._kernel_robot(own) if changes and own is not None else None
         with self._exclusive:
             self._kernel_batch.set_obstacles(index, compiled)
+            self._become(index, own, made)
             self._scenes[index] = scene
             self._unrested.add(index)
 
-    def leaves_clear(self, scene: Scene) -> bool:
-        """Return whether no obstacle of a scene overlaps the straight robot.
+    def leaves_clear(self, scene: Scene, robot: RobotT_co | None = None) -> bool:
+        """Return whether no obstacle of a scene overlaps the straight robot, that of the batch where none is given.
 
         Raises:
             ValueError: If an obstacle is of another space, or names a node that the robot does not have.
             TypeError: If ``scene`` is not a scene.
         """
         check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
-        clear = bool((self._straight_gaps(scene) >= 0).all())
-        self._clear = scene if clear else None
+        robot = robot or self.robot
+        clear = bool((self._straight_gaps(robot, scene) >= 0).all())
+        self._clear = (robot, scene) if clear else None
         return clear
 
     def rest(self, robots: Sequence[int]) -> None:
@@ -152,7 +163,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         """
         indices = self._all if robots is None else self._check_indices(robots)
         shape = (len(indices),) if self.cables == 1 else (len(indices), self.cables)
-        commands = check_array("cable_mm", cable_mm, shape, self._low[0], self._high[0], self._bound)
+        commands = check_array("cable_mm", cable_mm, shape, *self._cable_bounds(indices))
         motions = self._motions(indices, scenes)
         with self._exclusive:
             self._check_rested(indices)
@@ -192,8 +203,13 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             ValueError: If a command or a length in :attr:`blocks` is out of range, or a robot was not brought to rest
                 in its scene.
         """
-        bound = f"{self._bound}, and lengths from {self._low[-1]:.6g} to {self._high[-1]:.6g}"
-        commands = check_array("commands", commands, self.commands.shape, self._low, self._high, bound)
+        least, most, shortest, longest = self._limits.T
+        low, high = (
+            np.column_stack([np.tile(cable[:, None], self.cables), length])
+            for cable, length in ((least, shortest), (most, longest))
+        )
+        bound = f"{self._cable_bounds(self._all)[-1]}, and lengths from {shortest.min():.6g} to {longest.max():.6g}"
+        commands = check_array("commands", commands, self.commands.shape, low, high, bound)
         with self._exclusive:
             self._check_rested(self._all)
             self._check_lengths(self._all)
@@ -230,7 +246,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             robots: Indices of robots with scenes; their states are not changed.
             forces: Force for each robot, ``(k,)`` [N].
             increment_mm: Cable displacement of a step, at least a hundred thousandth of ``limit_mm`` [mm].
-            limit_mm: Bound on the cable displacement, at most ``robot.max_cable_mm`` [mm].
+            limit_mm: Bound on the cable displacement, at most ``max_cable_mm`` of each robot [mm].
             directions: Displacements of the cables per millimetre of pull, at most 1 in size, in the plane not
                 negative, ``(k, cables)``; ``None`` for ones.
             obstacle: Index of the obstacle whose contact force counts; ``None`` for the sum over all.
@@ -242,19 +258,19 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             ValueError: If a number or an index is out of range, an index is repeated, or a robot has no scene.
         """
         indices = self._check_assigned(robots)
-        count, most = len(indices), self.robot.cable_limit_mm
+        count, most = len(indices), min((self.robot_of(index).cable_limit_mm for index in indices), default=math.inf)
         forces = check_array("forces", forces, (count,), 0.0, LARGEST, "finite and not negative")
         limit = check_positive("limit_mm", limit_mm, high=most)
         increment = check_positive("increment_mm", increment_mm, limit / MAX_PULL_STEPS, LARGEST)
         given = np.ones((count, self.cables)) if directions is None else directions
-        least = 0.0 if self.robot.least_cable_mm == 0 else -1.0
+        least = 0.0 if (self._limits[indices, 0] == 0).any() else -1.0
         given = check_array("directions", given, (count, self.cables), least, 1.0, f"from {least:g} to 1")
         target = -1 if obstacle is None else check_whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
         reached = np.zeros((count, self.space))
-        length = self.robot.length_mm
+        lengths = [self.robot_of(index).length_mm for index in indices]
         with self._exclusive:
             found = self._kernel_batch.ramps_reach_forces(
-                indices, forces, target, given, increment, limit, length, reached
+                indices, forces, target, given, increment, limit, lengths, reached
             )
         return np.array(found, bool), reached
 
@@ -271,25 +287,20 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         scene = self.scene(index)
         self._check_rested([index])
         work = int(self.iterations[index]), int(self.factorizations[index])
-        return self._make_equilibrium(scene, self.blocks[index].copy(), Status(self.statuses[index]), *work)
+        block, status = self.blocks[index].copy(), Status(self.statuses[index])
+        return self._make_equilibrium(self.robot_of(index), scene, block, status, *work)
 
-    def _check_lengths(self, robots: list[int]) -> None:
-        """Check the lengths in blocks, which users may have written to."""
-        lengths = self.blocks[:, self.layout.length.at]
-        lengths = lengths if robots is self._all else lengths[robots]
-        low, high = self._low[-1], self._high[-1]
-        if lengths.size and not (low <= lengths.min() and lengths.max() <= high):
-            raise ValueError(
-                f"lengths in blocks are {shown(lengths)}; all must be from {low:.6g} to {high:.6g}: call rest(robots)"
-            )
-
-    def _straight_gaps(self, scene: Scene) -> np.ndarray:
-        if self._straight is None:
-            self._straight = np.ascontiguousarray(self._straight_points())
-        return touching_gaps(self.robot, scene, self._straight)
+    def _straight_gaps(self, robot: Any, scene: Scene) -> np.ndarray:
+        points = self._straight.get(robot)
+        if points is None:
+            points = np.ascontiguousarray(self._straight_points(robot))
+            self._straight = {kept: self._straight[kept] for kept in (self.robot,) if kept in self._straight}
+            self._straight[robot] = points
+        return touching_gaps(robot, scene, points)
 
     def _rest(self, robots: list[int]) -> None:
-        self._kernel_batch.rest(robots, self.robot.length_mm, self.blocks, *self._work)
+        lengths = [self.robot_of(robot).length_mm for robot in robots]
+        self._kernel_batch.rest(robots, lengths, self.blocks, *self._work)
 
     def _move_among(self, robots: list[int], motions: list[Motion]) -> None:
         """Move robots, some of them while their obstacles move."""

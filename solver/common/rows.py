@@ -16,6 +16,7 @@ from solver.common.scene import Scene
 from solver.common.validation import check_instance, check_sequence, check_whole, shown
 
 Kernel = Any  # a batch or a scene of the kernel, whose classes for the plane and for space share no base
+SIZES = ("model", "segments", "number of cables", "number of lines that can touch", "positions")
 NUMBERS = ("blocks", "statuses", "iterations", "factorizations", "commands")
 
 
@@ -24,7 +25,8 @@ class Rows:
     """States of robots of a batch: all that their next step depends on.
 
     Attributes:
-        robot: The robot that all of them are.
+        robot: The robot of the batch.
+        robots: Robot of each that has one of its own, ``None`` where it is that of the batch, k of them.
         scenes: Scene of each, ``None`` where none was assigned, k of them.
         rested: Whether each was brought to rest in its scene and may move, ``(k,)`` bool.
         blocks: Their equilibria, ``(k, size)``.
@@ -35,6 +37,7 @@ class Rows:
     """
 
     robot: AnyRobot
+    robots: tuple[AnyRobot | None, ...]
     scenes: tuple[Scene | None, ...]
     rested: np.ndarray
     blocks: np.ndarray
@@ -75,7 +78,12 @@ class RowBatch(ABC, Generic[RobotT_co]):
         self.iterations = np.zeros(count, np.int64)
         self.factorizations = np.zeros(count, np.int64)
         self.commands = np.zeros((count, self.cables + 1))
+        self._robots: list[RobotT_co | None] = [None] * count  # those that differ from the batch's
         self._scenes: list[Scene | None] = [None] * count
+        self._limits = np.tile(_limits(robot), (count, 1))  # of each robot, as _limits returns them
+        self._others: set[int] = set()  # whose robots differ from the batch's
+        least, most, *_ = _limits(robot)
+        self._bounds = least, most, f"from {least:.6g} to {most:.6g} (robot.max_cable_mm)"
         self._all = list(range(count))
         self._unrested = set(self._all)  # must be brought to rest before they move
         self._exclusive = ExclusiveUse()
@@ -86,8 +94,20 @@ class RowBatch(ABC, Generic[RobotT_co]):
         """Return the kernel's batch."""
 
     @abstractmethod
-    def _kernel_obstacles(self, scene: Scene) -> Kernel:
-        """Return the obstacles of a scene as the kernel takes them."""
+    def _kernel_robot(self, robot: Any) -> Kernel:
+        """Return a robot as the kernel takes it."""
+
+    @abstractmethod
+    def _kernel_obstacles(self, robot: Any, scene: Scene) -> Kernel:
+        """Return the obstacles of a scene around a robot as the kernel takes them."""
+
+    def robot_of(self, index: int) -> RobotT_co:
+        """Return what a robot of the batch is: the robot assigned to its index, or that of the batch.
+
+        Raises:
+            ValueError: If the index is out of range.
+        """
+        return self._robots[self._check_index(index)] or self.robot
 
     def get_rows(self, robots: Sequence[int]) -> Rows:
         """Return the states of some robots, as copies, which :meth:`set_rows` puts back, here or in another batch.
@@ -102,7 +122,9 @@ class RowBatch(ABC, Generic[RobotT_co]):
         with self._exclusive:
             numbers = [getattr(self, name)[indices] for name in NUMBERS]
             rested = np.array([index not in self._unrested for index in indices], bool)
-            return Rows(self.robot, tuple(self._scenes[index] for index in indices), rested, *numbers)
+            own = tuple(self._robots[index] for index in indices)
+            scenes = tuple(self._scenes[index] for index in indices)
+            return Rows(self.robot, own, scenes, rested, *numbers)
 
     def set_rows(self, robots: Sequence[int], rows: Rows) -> None:
         """Put robots into states of :meth:`get_rows`, from which they go on as those robots would, bit for bit.
@@ -120,17 +142,43 @@ class RowBatch(ABC, Generic[RobotT_co]):
         """
         indices = self._check_indices(robots)
         self._check_rows(rows, len(indices))
-        pairs = zip(indices, rows.scenes, strict=True)
-        changed = [(index, scene) for index, scene in pairs if scene is not None and scene != self._scenes[index]]
-        compiled = {scene: self._compile(scene) for scene in {scene for _, scene in changed}}
+        entries = list(zip(indices, rows.robots, rows.scenes, rows.rested.tolist(), strict=True))
+        changed = [entry[:3] for entry in entries if entry[1:3] != (self._robots[entry[0]], self._scenes[entry[0]])]
+        others = {robot for index, robot, _ in changed if robot is not None and robot != self._robots[index]}
+        for other in others:
+            self._check_own(other)
+        places = {(robot, scene) for _, robot, scene in changed if scene is not None}
+        compiled = {(robot, scene): self._compile(robot or self.robot, scene) for robot, scene in places}
+        made = {other: self._kernel_robot(other) for other in others}
         with self._exclusive:
-            for index, scene in changed:
-                self._kernel_batch.set_obstacles(index, compiled[scene])
-            for index, assigned, rested in zip(indices, rows.scenes, rows.rested.tolist(), strict=True):
-                self._scenes[index] = assigned
-                (self._unrested.discard if rested and assigned is not None else self._unrested.add)(index)
+            for index, robot, scene in changed:
+                if scene is not None:
+                    self._kernel_batch.set_obstacles(index, compiled[robot, scene])
+                self._become(index, robot, None if robot is None else made.get(robot))
+                self._scenes[index] = scene
+            for index, _, scene, rested in entries:
+                (self._unrested.discard if rested and scene is not None else self._unrested.add)(index)
             for name in NUMBERS:
                 getattr(self, name)[indices] = getattr(rows, name)
+
+    def _become(self, index: int, robot: Any, made: Kernel) -> None:
+        """Make a robot of the batch another one, given as the kernel takes it too; ``None`` for the batch's."""
+        if robot != self._robots[index]:
+            self._kernel_batch.set_robot(index, made)
+            self._robots[index], self._limits[index] = robot, _limits(robot or self.robot)
+            (self._others.discard if robot is None else self._others.add)(index)
+
+    def _check_own(self, robot: AnyRobot) -> None:
+        """Check that a robot can be one of this batch.
+
+        Raises:
+            ValueError: Naming what differs.
+            TypeError: If it is not a robot of the batch's space.
+        """
+        check_scene(robot, self.robot_kind, Scene(), self.space)
+        for name, own, wanted in zip(SIZES, _sizes(robot), _sizes(self.robot), strict=True):
+            if own != wanted:
+                raise ValueError(f"{name} of the robot is {own}; robots of this batch must have {wanted}, as its robot")
 
     def __reduce__(self) -> tuple[type[Self], tuple[object, ...], Rows]:
         arguments = self.robot, self.count, self.layout.obstacles, self.threads
@@ -149,6 +197,8 @@ class RowBatch(ABC, Generic[RobotT_co]):
         check_instance("rows", rows, Rows, "take those of get_rows")
         if rows.robot != self.robot:
             raise ValueError("the rows are of another robot; take those of a batch of an equal robot")
+        if len(rows.robots) != count:
+            raise ValueError(f"rows has {len(rows.robots)} robots; it must have one for each of the {count} robots")
         if len(rows.scenes) != count or np.shape(rows.rested) != (count,):
             raise ValueError(f"rows has {len(rows.scenes)} scenes; it must have one for each of the {count} robots")
         for name in NUMBERS:
@@ -170,31 +220,32 @@ class RowBatch(ABC, Generic[RobotT_co]):
         scenes = [scene for scene in check_sequence("scenes", scenes, "a list of scenes") if isinstance(scene, Scene)]
         if len(scenes) != len(robots):
             raise ValueError(f"scenes holds {len(scenes)} scenes; it must hold one for each of {len(robots)} robots")
-        pairs = zip(robots, scenes, strict=True)
-        return [self._motion(robot, target) for robot, target in pairs if target != self.scene(robot)]
-
-    def _motion(self, robot: int, scene: Scene) -> Motion:
-        bounds = self.scene(robot).check_motion(scene)
-        return Motion(robot, scene, self._compile(scene), bounds)
+        moving = [(robot, scene) for robot, scene in zip(robots, scenes, strict=True) if scene != self.scene(robot)]
+        bounds = [self.scene(robot).check_motion(scene) for robot, scene in moving]
+        return [
+            Motion(robot, scene, self._compile(self.robot_of(robot), scene), moved)
+            for (robot, scene), moved in zip(moving, bounds, strict=True)
+        ]
 
     def _place(self, motion: Motion, part: float) -> None:
         """Put the obstacles of a robot where they have moved to."""
         reached = self.scene(motion.robot).moved_towards(motion.scene, part)
-        compiled = motion.obstacles if part == 1 else self._kernel_obstacles(reached)
+        robot = self.robot_of(motion.robot)
+        compiled = motion.obstacles if part == 1 else self._kernel_obstacles(robot, reached)
         self._kernel_batch.set_obstacles(motion.robot, compiled)
         self._scenes[motion.robot] = reached
 
-    def _compile(self, scene: Scene) -> Kernel:
-        """Return the obstacles of a scene as the kernel takes them.
+    def _compile(self, robot: Any, scene: Scene) -> Kernel:
+        """Return the obstacles of a scene around a robot as the kernel takes them.
 
         Raises:
             ValueError: If the scene is none for the robot, or does not have the batch's number of obstacles.
         """
-        check_scene(self.robot, self.robot_kind, scene, self.space)
+        check_scene(robot, self.robot_kind, scene, self.space)
         if len(scene) != self.layout.obstacles:
             raise ValueError(f"scene has {len(scene)} obstacles; each of the batch's has {self.layout.obstacles}")
-        check_core(self.robot, scene)
-        return self._kernel_obstacles(scene)
+        check_core(robot, scene)
+        return self._kernel_obstacles(robot, scene)
 
     def scene(self, index: int) -> Scene:
         """Return the scene of a robot.
@@ -206,6 +257,25 @@ class RowBatch(ABC, Generic[RobotT_co]):
         if scene is None:
             raise ValueError(f"robot {index} has no scene; call assign({index}, scene)")
         return scene
+
+    def _cable_bounds(self, robots: list[int]) -> tuple[Any, Any, str]:
+        """Return least and largest displacements of the cables of some robots, and the bound as text."""
+        if not self._others or self._others.isdisjoint(robots):
+            return self._bounds
+        least, most = (ends if self.cables == 1 else ends[:, None] for ends in self._limits[robots, :2].T)
+        return least, most, "from least_cable_mm to max_cable_mm of each robot (robot_of(index))"
+
+    def _check_lengths(self, robots: list[int]) -> None:
+        """Check the lengths in blocks, which users may have written to."""
+        lengths, limits = self.blocks[:, self.layout.length.at], self._limits
+        if robots is not self._all:
+            lengths, limits = lengths[robots], limits[robots]
+        low, high = limits[:, 2], limits[:, 3]
+        if not ((low <= lengths) & (lengths <= high)).all():
+            raise ValueError(
+                f"lengths in blocks are {shown(lengths)}; all must be from {low.min():.6g} to {high.max():.6g}: "
+                "call rest(robots)"
+            )
 
     def _check_index(self, index: object) -> int:
         if type(index) is int and 0 <= index < self.count:
@@ -233,3 +303,13 @@ class RowBatch(ABC, Generic[RobotT_co]):
             raise ValueError(
                 f"robot {robot} has a new scene, or its rest was interrupted; call rest([{robot}]) before it moves"
             )
+
+
+def _limits(robot: AnyRobot) -> tuple[float, ...]:
+    """Return the least and largest cable displacement of a robot, and its shortest and longest length [mm]."""
+    return robot.least_cable_mm, robot.cable_limit_mm, robot.shortest_mm, robot.longest_mm
+
+
+def _sizes(robot: AnyRobot) -> tuple[object, ...]:
+    """Return what the memory layout of a robot depends on, in the order of :data:`SIZES`."""
+    return robot.model, robot.segments, len(robot.cables), len(robot.lines_mm), robot.positions

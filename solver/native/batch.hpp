@@ -1,4 +1,4 @@
-// Many robots alike, each among its own obstacles, moved by one call.
+// Many robots of one layout, each among its own obstacles, moved by one call.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,12 @@ class Batch {
   };
 
   Batch(const Robot& robot, int count, int obstacles, int threads)
-      : obstacles_(obstacles), scenes_(count), pool_(threads - 1) {
+      : obstacles_(obstacles),
+        scenes_(count),
+        robot_(std::make_shared<const Robot>(robot)),
+        robots_(count, robot_),
+        present_(threads, robot_.get()),
+        pool_(threads - 1) {
     for (int k = 0; k < threads; ++k) {
       workers_.push_back(make_continuation<D>(robot, obstacles));
       workers_[k]->set_interruption([this, k] { return is_stopped(k); });
@@ -46,6 +51,13 @@ class Batch {
 
   // Puts a robot, by its index, among other obstacles.
   void set_obstacles(int robot, std::vector<Obstacle<D>> obstacles) { scenes_[robot] = std::move(obstacles); }
+
+  const Robot& robot() const { return *robot_; }
+  // Makes a robot, by its index, another one of the same layout; null for the batch's.
+  void set_robot(int index, const Robot* robot) {
+    robots_[index] = robot ? std::make_shared<const Robot>(*robot) : robot_;
+    std::fill(present_.begin(), present_.end(), nullptr);  // whose addresses may come again
+  }
 
   const std::vector<Obstacle<D>>& scene(int robot) const { return scenes_[robot]; }
 
@@ -61,7 +73,7 @@ class Batch {
       Continuation<D>& worker = *workers_[thread];
       for (int first; !stopped_ && (first = next.fetch_add(kChunk)) < count;) {
         for (int k = first; k < std::min(first + kChunk, count) && !stopped_; ++k) {
-          worker.set_obstacles(scenes_[robots[k]]);
+          place(thread, robots[k]);
           work(worker, k);
         }
         if (thread == 0) is_stopped(0);
@@ -81,6 +93,14 @@ class Batch {
   static constexpr int kChunk = 2;   // robots taken at a time
   static constexpr int kAlone = 16;  // so few robots are not worth waking a thread for
 
+  // Puts the worker of a thread in the place of a robot.
+  void place(int thread, int robot) {
+    const Robot* wanted = robots_[robot].get();
+    if (present_[thread] != wanted) workers_[thread]->set_robot(*wanted);
+    present_[thread] = wanted;
+    workers_[thread]->set_obstacles(scenes_[robot]);
+  }
+
   // Whether the call under way is to end. The calling thread asks; the others wake it to do so.
   bool is_stopped(int thread) {
     if (thread > 0)
@@ -92,6 +112,9 @@ class Batch {
 
   int obstacles_;
   std::vector<std::vector<Obstacle<D>>> scenes_;
+  std::shared_ptr<const Robot> robot_;
+  std::vector<std::shared_ptr<const Robot>> robots_;
+  std::vector<const Robot*> present_;  // of each worker; null where it is to be set again
   std::vector<std::unique_ptr<Continuation<D>>> workers_;
   std::function<bool()> stop_;  // of the call under way
   std::atomic<bool> stopped_ = false;

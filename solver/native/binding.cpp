@@ -45,7 +45,8 @@ void bind_kernel(nb::module_& m, const char* name) {
 
 template <int D>
 void bind_batch(nb::module_& m, const char* name) {
-  nb::class_<Batch<D>>(m, name, "Many robots alike, each in a scene of its own. Their states are the caller's arrays.")
+  nb::class_<Batch<D>>(m, name,
+                       "Many robots of one layout, each in a scene of its own. Their states are the caller's arrays.")
       .def(
           "__init__",
           [](Batch<D>* self, const Robot& robot, int count, int obstacles, int threads) {
@@ -55,8 +56,10 @@ void bind_batch(nb::module_& m, const char* name) {
           "robot"_a, "count"_a, "obstacles"_a, "threads"_a)
       .def("set_obstacles", &set_obstacles<D>, "robot"_a, "obstacles"_a,
            "Put a robot among other obstacles. Its block stays as it is.")
-      .def("rest", &rest<D>, "robots"_a, "length"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
-           "Bring some robots to rest at a length, in place.")
+      .def("set_robot", &set_robot<D>, "index"_a, "robot"_a.none(),
+           "Make a robot another one with a block of the same fields; None for that of the batch. Its block stays.")
+      .def("rest", &rest<D>, "robots"_a, "lengths"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
+           "Bring some robots to rest, each at its length, in place.")
       .def(
           "move", &move<D>, "robots"_a, "motions"_a, "commands"_a, "blocks"_a, "parts"_a, "statuses"_a, "iterations"_a,
           "factorizations"_a,
@@ -67,7 +70,7 @@ void bind_batch(nb::module_& m, const char* name) {
       .def("optimality", &optimality<D>, "blocks"_a, "found"_a,
            "Write stationarity, gap and complementarity of all robots.")
       .def("ramps_reach_forces", &ramps_reach_forces<D>, "robots"_a, "forces"_a, "obstacle"_a, "directions"_a,
-           "increment"_a, "limit"_a, "length"_a, "reached"_a,
+           "increment"_a, "limit"_a, "lengths"_a, "reached"_a,
            "Return whether steady pulls of some robots from rest, along directions, reach their forces without an "
            "event.");
 }

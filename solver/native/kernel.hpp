@@ -3,6 +3,7 @@
 
 #include <nanobind/nanobind.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <numeric>
@@ -244,6 +245,21 @@ void set_obstacles(Batch<D>& batch, int robot, std::vector<Obstacle<D>> obstacle
   batch.set_obstacles(robot, std::move(obstacles));
 }
 
+// Makes a robot another one with a block of the same fields; null for the batch's.
+template <int D>
+void set_robot(Batch<D>& batch, int index, const Robot* robot) {
+  const typename Batch<D>::Lock lock(batch);
+  require_index(batch, index);
+  if (robot) {
+    const auto numbers = [](const Robot& of) {
+      return std::tuple(of.model, of.segments, of.rod.cables.size(), of.lines.size(), of.between);
+    };
+    require(numbers(*robot) == numbers(batch.robot()),
+            "the robot must have the model and the numbers of segments, cables, lines and points of the batch's");
+  }
+  batch.set_robot(index, robot);
+}
+
 template <int D>
 void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands, const Blocks& blocks,
           const Counts& statuses, const Counts& iterations, const Counts& factorizations) {
@@ -263,22 +279,22 @@ void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands
   });
 }
 
-// Brings some robots to rest at a length.
+// Brings some robots to rest, each at its length.
 template <int D>
-void rest(Batch<D>& batch, const std::vector<int>& robots, double length, const Blocks& blocks, const Counts& statuses,
-          const Counts& iterations, const Counts& factorizations) {
+void rest(Batch<D>& batch, const std::vector<int>& robots, const std::vector<double>& lengths, const Blocks& blocks,
+          const Counts& statuses, const Counts& iterations, const Counts& factorizations) {
   const typename Batch<D>::Lock lock(batch);
   require_blocks(batch, blocks);
   const std::size_t count = batch.count(), size = batch.layout().size;
   require(statuses.shape(0) == count && iterations.shape(0) == count && factorizations.shape(0) == count,
           "statuses, iterations and factorizations must have a number for each robot");
-  require(std::isfinite(length) && length > 0, "a length is not finite and positive");
+  require_lengths(robots, lengths);
   for (const int robot : robots) require_index(batch, robot);
   double* block = blocks.data();
   std::int64_t *status = statuses.data(), *iterated = iterations.data(), *factored = factorizations.data();
   each(batch, robots, [&](Continuation<D>& continuation, int k) {
     const int i = robots[k];
-    const StepResult result = continuation.rest(length, block + size * i);
+    const StepResult result = continuation.rest(lengths[k], block + size * i);
     if (result.interrupted) return;
     status[i] = static_cast<int>(result.status);
     iterated[i] = result.iterations;
@@ -307,13 +323,14 @@ void optimality(Batch<D>& batch, const Blocks& blocks, const Blocks& found) {
 
 template <int D>
 std::vector<int> ramps_reach_forces(Batch<D>& batch, const std::vector<int>& robots, const Values& forces, int obstacle,
-                                    const Table& directions, double increment, double limit, double length,
-                                    const Blocks& reached) {
+                                    const Table& directions, double increment, double limit,
+                                    const std::vector<double>& lengths, const Blocks& reached) {
   const typename Batch<D>::Lock lock(batch);
   const std::size_t count = robots.size(), cables = batch.layout().cables.size;
   require(forces.shape(0) == count && directions.shape(0) == count && directions.shape(1) == cables &&
               reached.shape(0) == count && reached.shape(1) == D,
           "forces (k), directions (k, cables) and reached (k, d) must have a row for each robot");
+  require_lengths(robots, lengths);
   for (const int robot : robots) require_index(batch, robot);
   std::vector<int> found(count);
   const double *force = forces.data(), *direction = directions.data();
@@ -324,7 +341,7 @@ std::vector<int> ramps_reach_forces(Batch<D>& batch, const std::vector<int>& rob
                                                 .direction = direction + cables * k,
                                                 .increment = increment,
                                                 .limit = limit,
-                                                .length = length},
+                                                .length = lengths[k]},
                                                to + D * k);
   });
   return found;

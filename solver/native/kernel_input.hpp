@@ -155,4 +155,10 @@ inline void require_sound(const BlockLayout& layout, const double* block) {
   require_command(block + layout.cables.offset, layout.cables.size);
 }
 
+inline void require_lengths(const std::vector<int>& robots, const std::vector<double>& lengths) {
+  const auto sound = [](double length) { return std::isfinite(length) && length > 0; };
+  require(lengths.size() == robots.size() && std::all_of(lengths.begin(), lengths.end(), sound),
+          "lengths must have a finite and positive number for each robot");
+}
+
 }  // namespace ccr::binding

@@ -26,10 +26,10 @@ class BatchSolver(RobotBatch[Robot, Equilibrium]):
     space = 2
     robot_kind = Robot
 
-    def _straight_points(self) -> np.ndarray:
-        nodes = np.zeros((self.robot.segments + 1, 3))
-        nodes[:, 1] = np.linspace(0.0, self.robot.length_mm, len(nodes))
-        return touching_points(self.robot, nodes)
+    def _straight_points(self, robot: Robot) -> np.ndarray:
+        nodes = np.zeros((robot.segments + 1, 3))
+        nodes[:, 1] = np.linspace(0.0, robot.length_mm, len(nodes))
+        return touching_points(robot, nodes)
 
     def _make_layout(self, robot: Robot, obstacles: int) -> Layout:
         return layout(robot, obstacles)
@@ -37,11 +37,16 @@ class BatchSolver(RobotBatch[Robot, Equilibrium]):
     def _make_kernel(self, obstacles: int, threads: int) -> _kernel.Batch:
         return _kernel.Batch(kernel_robot(self.robot), self.count, obstacles, threads)
 
-    def _kernel_obstacles(self, scene: Scene) -> list[_kernel.Obstacle]:
-        return kernel_scene(self.robot, scene)
+    def _kernel_robot(self, robot: Robot) -> _kernel.Robot:
+        return kernel_robot(robot)
 
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> Equilibrium:
-        return Equilibrium(self.robot, scene, block, status, *work)
+    def _kernel_obstacles(self, robot: Robot, scene: Scene) -> list[_kernel.Obstacle]:
+        return kernel_scene(robot, scene)
+
+    def _make_equilibrium(
+        self, robot: Robot, scene: Scene, block: np.ndarray, status: Status, *work: int
+    ) -> Equilibrium:
+        return Equilibrium(robot, scene, block, status, *work)
 
 
 class ReferenceBatch(BatchSolver):
@@ -63,7 +68,7 @@ class ReferenceBatch(BatchSolver):
         raise ValueError("obstacles of a ReferenceBatch do not move; use a BatchSolver")
 
     def _reference(self, robot: int) -> ReferenceSolver:
-        return _reference(self.robot, self.scene(robot))
+        return _reference(self.robot_of(robot), self.scene(robot))
 
     def _keep(self, robot: int, reached: Equilibrium) -> None:
         self.blocks[robot] = reached.block

@@ -21,10 +21,10 @@ class SpatialBatchSolver(RobotBatch[SpatialRobot, SpatialEquilibrium]):
     space = 3
     robot_kind = SpatialRobot
 
-    def _straight_points(self) -> np.ndarray:
-        nodes = np.zeros((self.robot.segments + 1, 3))
-        nodes[:, 2] = np.linspace(0.0, self.robot.length_mm, len(nodes))
-        return touching_points(self.robot, nodes, np.tile(np.eye(3), (len(nodes), 1, 1)))
+    def _straight_points(self, robot: SpatialRobot) -> np.ndarray:
+        nodes = np.zeros((robot.segments + 1, 3))
+        nodes[:, 2] = np.linspace(0.0, robot.length_mm, len(nodes))
+        return touching_points(robot, nodes, np.tile(np.eye(3), (len(nodes), 1, 1)))
 
     def _make_layout(self, robot: SpatialRobot, obstacles: int) -> Layout:
         return spatial_layout(robot, obstacles)
@@ -32,8 +32,13 @@ class SpatialBatchSolver(RobotBatch[SpatialRobot, SpatialEquilibrium]):
     def _make_kernel(self, obstacles: int, threads: int) -> _kernel.SpatialBatch:
         return _kernel.SpatialBatch(kernel_robot(self.robot), self.count, obstacles, threads)
 
-    def _kernel_obstacles(self, scene: Scene) -> list[_kernel.SpatialObstacle]:
-        return kernel_scene(self.robot, scene)
+    def _kernel_robot(self, robot: SpatialRobot) -> _kernel.Robot:
+        return kernel_robot(robot)
 
-    def _make_equilibrium(self, scene: Scene, block: np.ndarray, status: Status, *work: int) -> SpatialEquilibrium:
-        return SpatialEquilibrium(self.robot, scene, block, status, *work)
+    def _kernel_obstacles(self, robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:
+        return kernel_scene(robot, scene)
+
+    def _make_equilibrium(
+        self, robot: SpatialRobot, scene: Scene, block: np.ndarray, status: Status, *work: int
+    ) -> SpatialEquilibrium:
+        return SpatialEquilibrium(robot, scene, block, status, *work)

@@ -145,13 +145,16 @@ TEST_CASE("snaps allocate nothing") {
   CHECK(allocated == 0);
 }
 
-TEST_CASE("a batch's steps allocate nothing") {
-  const RobotNumbers of = prototype();
-  const Robot robot = make_robot<2>(of);
+void check_batch(bool rod, bool differ) {
+  const RobotNumbers of = prototype(rod);
+  RobotNumbers longer = of;
+  longer.length = 190;
+  const Robot robot = make_robot<2>(of), other = make_robot<2>(longer);
   constexpr int kCount = 64;
   Batch<2> batch(robot, kCount, 1, 2);
   std::vector<int> robots;
   for (int i = 0; i < kCount; ++i) {
+    if (differ && i % 3 == 0) batch.set_robot(i, &other);
     batch.set_obstacles(i, {circle(robot, 44 + 0.1 * i, 104, 15)});
     robots.push_back(i);
   }
@@ -175,6 +178,12 @@ TEST_CASE("a batch's steps allocate nothing") {
   int rounds = 1;
   while (rounds <= 50 && round_allocates()) ++rounds;
   CHECK(rounds <= 50);
+}
+
+TEST_CASE("a batch's steps allocate nothing") { check_batch(false, false); }
+
+TEST_CASE("a batch's steps allocate nothing where its robots differ") {
+  for (const bool rod : {false, true}) check_batch(rod, true);
 }
 
 }  // namespace

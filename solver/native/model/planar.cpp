@@ -34,6 +34,14 @@ Planar<Law>::Planar(const Robot& robot)
       free_bend_(1),
       adjoints_(robot.segments),
       cables_(robot.rod.cables, robot.segments) {
+  set_robot(robot);
+}
+
+template <class Law>
+void Planar<Law>::set_robot(const Robot& robot) {
+  robot_ = robot;
+  free_command_ = {{{-1}}, 0};
+  if constexpr (kRod) cables_.set_cables(robot.rod.cables);
   const Rod& rod = robot.rod;
   has_free_form_ = !kRod || (robot.bends_evenly() && rod.cables.size() == 1 && rod.stiffness[0] == 1 &&
                              rod.rest[0] == 0 && rod.cables[0].hole[0] == robot.offset);

@@ -54,6 +54,7 @@ class Planar {
   using System = Riccati<kState, kControl, PlanarTransition>;
 
   explicit Planar(const Robot& robot);
+  void set_robot(const Robot& robot);  // with as many segments and cables
 
   static Position<2> lever(const Frame& frame, const Vec<2>& line) {
     return {{line[0] * frame[0], line[0] * frame[1]}};

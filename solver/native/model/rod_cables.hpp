@@ -1,6 +1,7 @@
 // The cables of a rod at one trial shape: what its bending takes up from each, with slopes in the controls.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "math/rows.hpp"
@@ -16,6 +17,13 @@ class RodCables {
 
   RodCables(const std::vector<Cable>& cables, int segments)
       : cables_(cables), minus_slopes_(cables.size(), std::vector<Control>(Rows::room(segments))) {}
+
+  // Switches to other cables, as many as before.
+  void set_cables(const std::vector<Cable>& cables) {
+    cables_ = cables;
+    for (int j = 0; j < count(); ++j)  // beyond its end a cable has no slopes
+      std::fill(minus_slopes_[j].begin() + cables_[j].end, minus_slopes_[j].end(), Control{});
+  }
 
   int count() const { return static_cast<int>(cables_.size()); }
   const Cable& operator[](int cable) const { return cables_[cable]; }

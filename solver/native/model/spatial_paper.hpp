@@ -30,6 +30,7 @@ class SpatialPaper {
   using System = Riccati<kState, kControl, SpatialTransition>;
 
   explicit SpatialPaper(const Robot& robot);
+  void set_robot(const Robot& robot) { robot_ = robot; }  // with as many segments
 
   static Position<3> lever(const Frame& frame, const Vec<2>& line) { return disk_lever(frame, line); }
 

@@ -1,6 +1,7 @@
 #include "model/spatial_rod.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "model/disk_gap.hpp"
@@ -25,11 +26,22 @@ SpatialRod::SpatialRod(const Robot& robot)
       distances_(robot.rod.cables.size() * Rows::room(robot.segments)) {
   frames[0] = kBaseFrame;
   for (int k = 0; k < cables_.count(); ++k) {
-    const auto& [hole, end] = cables_[k];
     double* distances = distances_.data() + k * Rows::room(robot.segments);
-    arc_cables_.push_back({{hole[0], hole[1], norm(hole)}, end, distances, cables_.minus_slopes(k)});
+    arc_cables_.push_back({{}, 0, distances, cables_.minus_slopes(k)});
   }
   pulls_.reserve(arc_cables_.size());
+  set_robot(robot);
+}
+
+void SpatialRod::set_robot(const Robot& robot) {
+  robot_ = robot;
+  cables_.set_cables(robot.rod.cables);
+  for (int k = 0; k < cables_.count(); ++k) {
+    const auto& [hole, end] = cables_[k];
+    ArcCable& cable = arc_cables_[k];
+    std::copy_n(std::array{hole[0], hole[1], norm(hole)}.begin(), 3, cable.hole);
+    cable.end = end;
+  }
 }
 
 bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& controls) {

@@ -29,6 +29,7 @@ class SpatialRod {
   using System = Riccati<kState, kControl, SpatialTransition>;
 
   explicit SpatialRod(const Robot& robot);
+  void set_robot(const Robot& robot);  // with as many segments and cables
 
   static Position<3> lever(const Frame& frame, const Vec<2>& line) { return disk_lever(frame, line); }
 

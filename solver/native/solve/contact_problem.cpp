@@ -21,7 +21,16 @@ ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
       mount_of_(obstacles, -1),
       node_forces_(robot.segments + 1) {
   near_.reserve(gaps_.size());
+  set_robot(robot);
+}
+
+template <class Model>
+void ContactProblem<Model>::set_robot(const Robot& robot) {
+  robot_ = robot;
+  model_.set_robot(robot);
   const int stride = robot.between + 1;
+  sites_.clear();
+  farthest_line_ = 0;
   for (const Vec<2>& line : robot.lines) {
     for (int k = 0; k < robot.positions(); ++k)
       sites_.push_back({k / stride, static_cast<double>(k % stride) / stride, line});

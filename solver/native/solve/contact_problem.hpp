@@ -84,6 +84,9 @@ class ContactProblem {
   // `obstacles` is the number of obstacles of every scene.
   ContactProblem(const Robot& robot, int obstacles);
 
+  // Switches to a robot with the same numbers of segments, cables and points; obstacles are to be set again.
+  void set_robot(const Robot& robot);
+
   // Switches to another scene with the same number of obstacles. The span must outlive its use.
   void set_obstacles(std::span<const Obstacle> obstacles);
 

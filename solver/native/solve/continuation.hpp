@@ -34,6 +34,10 @@ class Continuation {
 
   virtual const BlockLayout& layout() const = 0;
 
+  // Switches to another robot of the same layout; `set_obstacles` must follow. Results are those of a continuation made
+  // for it.
+  virtual void set_robot(const Robot& robot) = 0;
+
   // Switches to another scene with the same number of obstacles. The span must outlive its use.
   virtual void set_obstacles(std::span<const Obstacle<D>> obstacles) = 0;
 

@@ -26,13 +26,19 @@ struct ModelContinuation<Model>::Pursuit {
 
 namespace {
 
-// One segment of a robot that bends evenly.
-Robot one_segment(Robot robot) {
-  robot.max_length /= robot.segments;
-  robot.segments = 1;
-  robot.lines = {{}};
-  for (Cable& cable : robot.rod.cables) cable.end = 1;
-  return robot;
+// Leaves in `one` a segment of a robot that bends evenly.
+void take_segment(const Robot& robot, Robot& one) {
+  one = robot;
+  one.max_length /= robot.segments;
+  one.segments = 1;
+  one.lines.assign(1, {});
+  for (Cable& cable : one.rod.cables) cable.end = 1;
+}
+
+Robot one_segment(const Robot& robot) {
+  Robot one;
+  take_segment(robot, one);
+  return one;
 }
 
 }  // namespace
@@ -46,7 +52,8 @@ ModelContinuation<Model>::ModelContinuation(const Robot& robot, int obstacles)
                                         .obstacles = obstacles})),
       newton_(robot, obstacles),
       bends_evenly_(robot.bends_evenly()),
-      segment_(one_segment(robot), 0),
+      one_(one_segment(robot)),
+      segment_(one_, 0),
       nodes_(robot.segments + 1),
       frames_(robot.segments + 1),
       points_(robot.points()) {
@@ -56,47 +63,20 @@ ModelContinuation<Model>::ModelContinuation(const Robot& robot, int obstacles)
 }
 
 template <class Model>
+void ModelContinuation<Model>::set_robot(const Robot& robot) {
+  problem_.set_robot(robot);
+  bends_evenly_ = robot.bends_evenly();
+  if (!bends_evenly_) return;
+  take_segment(robot, one_);
+  segment_.problem.set_robot(one_);
+}
+
+template <class Model>
 void ModelContinuation<Model>::set_obstacles(std::span<const Obstacle<kSpace>> obstacles) {
   newton_.set_obstacles(obstacles);
   trend_.mounts.resize(problem_.mounts());
   present_.mounts.resize(problem_.mounts());
   trial_ = present_;
-}
-
-// Distance of two commands, in displacements of a cable [a].
-template <class Model>
-double ModelContinuation<Model>::command_distance(const Command& a, const Command& b) const {
-  const Robot& robot = problem_.robot();
-  double farthest = 0;
-  for (int k = 0; k < kCables; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
-  farthest = std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
-  farthest = std::max(farthest, kMotion * problem_.obstacle_motion(a.scene, b.scene) / robot.max_length);
-  return std::max(farthest, kLoading * std::abs(a.loads - b.loads));
-}
-
-// The travel that the trend is a slope in: signed for one cable; several cables move evenly while their trend lasts.
-template <class Model>
-double ModelContinuation<Model>::travel(const Command& from, const Command& to) const {
-  return keeps_trend() ? to.cables[0] - from.cables[0] : command_distance(from, to);
-}
-
-// How far a cable is pulled in. A displacement in the paper's model of space pulls one cable of a pair.
-template <class Model>
-double ModelContinuation<Model>::pull(const Command& command, int cable) const {
-  return Model::kRod ? command.cables[cable] : std::abs(command.cables[cable]);
-}
-
-template <class Model>
-bool ModelContinuation<Model>::pulls_cable(const Command& command) const {
-  for (int k = 0; k < kCables; ++k)
-    if (pull(command, k) > pull(present_.command, k)) return true;
-  return false;
-}
-
-template <class Model>
-bool ModelContinuation<Model>::only_releases(const Command& command) const {
-  return !pulls_cable(command) && command.length == present_.command.length &&
-         command.loads == present_.command.loads && !moves_obstacles(command) && !(command == present_.command);
 }
 
 template <class Model>
@@ -323,12 +303,7 @@ StepResult ModelContinuation<Model>::trace(const double* from, const double* tar
   template void ModelContinuation<Model>::evaluate_present();                                  \
   template StepResult ModelContinuation<Model>::finish(const Command&, double*);               \
   template void ModelContinuation<Model>::accept();                                            \
-  template void ModelContinuation<Model>::record_shape();                                      \
-  template double ModelContinuation<Model>::travel(const Command&, const Command&) const;      \
-  template double ModelContinuation<Model>::pull(const Command&, int) const;                   \
-  template bool ModelContinuation<Model>::pulls_cable(const Command&) const;                   \
-  template bool ModelContinuation<Model>::only_releases(const Command&) const;                 \
-  template double ModelContinuation<Model>::command_distance(const Command&, const Command&) const;
+  template void ModelContinuation<Model>::record_shape();
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

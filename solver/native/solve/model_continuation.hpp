@@ -1,8 +1,8 @@
 // The continuation compiled for one model. Its files: block_io (blocks read and written), model_continuation (a branch
-// followed), trend (how it goes on), rest (where it begins), acceptance (whether a shape continues the branch), passage
-// (whether the robot passed through an obstacle), motion (obstacles that move), tension_limit (stalls and
-// yielding motors), conflict (cables that
-// pull against each other), descent (what happens after the end of a branch), ramp (whether a pull reaches a force).
+// followed), commands (how they compare), trend (how it goes on), rest (where it begins), acceptance (whether a shape
+// continues the branch), passage (whether the robot passed through an obstacle), motion (obstacles that move),
+// tension_limit (stalls and yielding motors), conflict (cables that pull against each other), descent (what happens
+// after the end of a branch), ramp (whether a pull reaches a force).
 #pragma once
 
 #include <array>
@@ -42,6 +42,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   ModelContinuation(const ModelContinuation&) = delete;
 
   const BlockLayout& layout() const override { return layout_; }
+  void set_robot(const Robot& robot) override;
   void set_obstacles(std::span<const Obstacle<kSpace>> obstacles) override;
   void set_interruption(Interruption interruption) override { interruption_ = std::move(interruption); }
   StepResult rest(double length, double* to) override;
@@ -154,9 +155,10 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   BlockLayout layout_;
   Newton<Model> newton_;
   ContactProblem& problem_ = newton_.problem;
-  bool bends_evenly_;      // whether all segments do where nothing touches,
-  Newton<Model> segment_;  // as this one does,
-  Iterate even_;           // of this shape
+  bool bends_evenly_;  // whether all segments do where nothing touches,
+  Robot one_;          // as this robot of one segment does,
+  Newton<Model> segment_;
+  Iterate even_;  // of this shape
   Iterate present_, trial_;
   Trend<Model> trend_;  // at `present_`
   double energy_ = 0;   // of `present_`

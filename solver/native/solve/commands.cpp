@@ -1,0 +1,57 @@
+// How commands compare: how far apart they are, and what they ask of the cables.
+#include <algorithm>
+#include <cmath>
+
+#include "model/models.hpp"
+#include "solve/model_continuation.hpp"
+
+namespace ccr {
+
+using namespace tolerances;
+
+// Distance of two commands, in displacements of a cable [a].
+template <class Model>
+double ModelContinuation<Model>::command_distance(const Command& a, const Command& b) const {
+  const Robot& robot = problem_.robot();
+  double farthest = 0;
+  for (int k = 0; k < kCables; ++k) farthest = std::max(farthest, std::abs(a.cables[k] - b.cables[k]));
+  farthest = std::max(farthest / robot.offset, kInsertion * std::abs(a.length - b.length) / robot.max_length);
+  farthest = std::max(farthest, kMotion * problem_.obstacle_motion(a.scene, b.scene) / robot.max_length);
+  return std::max(farthest, kLoading * std::abs(a.loads - b.loads));
+}
+
+// The travel that the trend is a slope in: signed for one cable; several cables move evenly while their trend lasts.
+template <class Model>
+double ModelContinuation<Model>::travel(const Command& from, const Command& to) const {
+  return keeps_trend() ? to.cables[0] - from.cables[0] : command_distance(from, to);
+}
+
+// How far a cable is pulled in. A displacement in the paper's model of space pulls one cable of a pair.
+template <class Model>
+double ModelContinuation<Model>::pull(const Command& command, int cable) const {
+  return Model::kRod ? command.cables[cable] : std::abs(command.cables[cable]);
+}
+
+template <class Model>
+bool ModelContinuation<Model>::pulls_cable(const Command& command) const {
+  for (int k = 0; k < kCables; ++k)
+    if (pull(command, k) > pull(present_.command, k)) return true;
+  return false;
+}
+
+template <class Model>
+bool ModelContinuation<Model>::only_releases(const Command& command) const {
+  return !pulls_cable(command) && command.length == present_.command.length &&
+         command.loads == present_.command.loads && !moves_obstacles(command) && !(command == present_.command);
+}
+
+#define CCR_INSTANTIATE(Model)                                                            \
+  template double ModelContinuation<Model>::travel(const Command&, const Command&) const; \
+  template double ModelContinuation<Model>::pull(const Command&, int) const;              \
+  template bool ModelContinuation<Model>::pulls_cable(const Command&) const;              \
+  template bool ModelContinuation<Model>::only_releases(const Command&) const;            \
+  template double ModelContinuation<Model>::command_distance(const Command&, const Command&) const;
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
+
+}  // namespace ccr
