@@ -102,7 +102,7 @@ def test_invalid_tasks_are_refused(env_id, task, message):
         ({"force_limit": NAN}, "force_limit is nan"),
         ({"force_limit": "0.3"}, "force_limit is '0.3'"),
         ({"force_sensor": 1}, "force_sensor is 1; it must be True or False"),
-        ({"obs_mode": None}, "obs_mode is None; it must be 'dict' or 'flat'"),
+        ({"obs_mode": None}, "obs_mode is None; it must be 'flat' or 'dict' or 'goal'"),
         ({"obs_mode": np.zeros(2)}, "obs_mode is"),
         ({"backend": ["native"]}, "backend is"),
         ({"estimator": "best"}, "estimator is 'best'; it must be 'contact' or 'paper'"),

@@ -10,9 +10,13 @@ from ccr_gym import ENV_IDS
 @pytest.mark.parametrize("kind", [ForceController.tuned, ForceController.proportional_only])
 def test_with_ideal_sensing_it_reaches_the_set_point(env_id, kind):
     last = np.array([episode.error[-1] for episode in run_episodes(kind(env_id), env_id, seed=50, count=20)])
-    moving = "Track" in env_id  # which it follows with a delay
-    assert np.median(last) < (0.15 if moving else 0.01)
-    assert (last <= 0.05).mean() >= (0.15 if moving else 0.8)
+    median, share = 0.01, 0.8
+    if "Track" in env_id:  # a set-point that it follows with a delay
+        median, share = 0.15, 0.15
+    elif "Moving" in env_id:  # an obstacle that does not wait for it
+        median, share = 0.02, 0.6
+    assert np.median(last) < median
+    assert (last <= 0.05).mean() >= share
 
 
 def test_it_searches_until_something_touches_and_forgets():

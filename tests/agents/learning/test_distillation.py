@@ -29,7 +29,7 @@ def test_the_teacher_is_exact_and_moves_nothing_by_trying(env_id):
         envs.step(actions)
     state = envs.get_attr("privileged_state", [0])[0]
     missed = np.abs(np.linalg.norm(state.force, axis=1) / state.goal - 1)
-    assert np.median(missed) < (0.1 if "Track" in env_id else 0.002)
+    assert np.median(missed) < {"CCR/TrackForce-v1": 0.1, "CCR/MovingObstacle-v1": 0.005}.get(env_id, 0.002)
 
 
 def test_the_teacher_does_what_newtons_controller_does():
@@ -56,5 +56,5 @@ def test_a_student_learns(tmp_path, monkeypatch):
     assert student.name == "Distilled"
     assert student.training.curve.returns[-1] > student.training.curve.returns[0]
     kwargs = {"sensing": "realistic", "split": "train"}
-    assert np.median(scores(student, config.env_id, 300, 12, **kwargs)) < 36  # mN
+    assert np.median(scores(student, config.env_id, 300, 12, **kwargs)) < 45  # mN, of set-points of 131
     assert any(tmp_path.glob("log_1/events*"))

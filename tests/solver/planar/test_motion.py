@@ -68,7 +68,8 @@ def optimality(robot, state):
     """Return the residuals of an equilibrium in its own scene, which may overlap the straight robot."""
     batch, none = BatchSolver(robot, 1, len(state.scene)), np.zeros(1, np.int64)
     command = state.block[None, : len(robot.cables) + 1]
-    batch.set_rows([0], Rows(robot, (state.scene,), np.ones(1, bool), state.block[None], none, none, none, command))
+    rows = Rows(robot, (None,), (state.scene,), np.ones(1, bool), state.block[None], none, none, none, command)
+    batch.set_rows([0], rows)
     return batch.optimality()
 
 

@@ -82,7 +82,8 @@ def test_opposing_cables_pay_out():
     assert pressed.gaps.min() >= -1e-12 * robot.length_mm
     batch, none = BatchSolver(robot, 1, 1), np.zeros(1, np.int64)
     command = pressed.block[None, :3]
-    batch.set_rows([0], Rows(robot, (pressed.scene,), np.ones(1, bool), pressed.block[None], none, none, none, command))
+    rows = Rows(robot, (None,), (pressed.scene,), np.ones(1, bool), pressed.block[None], none, none, none, command)
+    batch.set_rows([0], rows)
     assert batch.optimality().max() <= 1e-8
     released = solver.step(pressed, (5.0, -5.5), scene=scene)
     assert released.status is Status.CONVERGED
