@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ccr_gym.adapters import AnyAdapter
+from ccr_gym.quantities import EnvIndex
 from ccr_gym.state import Arrays, put, take
 from solver import RigidityFit, Robot, Scene, fitted_slopes, virtual_work
 from solver.common.operations import ARRAYS
@@ -132,6 +133,7 @@ class ForceEstimator:
     Attributes:
         chosen: Factors of the estimate that is observed, on the nominal forces, ``(N,)``.
         paper: Factors of the ``paper`` estimate, ``(N,)``.
+        learns: Whether the rigidity is unknown, and learnt from robots that nothing touches.
 
     Args:
         adapter: Adapter of the robots.
@@ -141,7 +143,7 @@ class ForceEstimator:
     """
 
     def __init__(self, adapter: AnyAdapter, count: int, threads: int, *, learns: bool) -> None:
-        self._adapter, self._learns = adapter, learns
+        self._adapter, self.learns = adapter, learns
         self._contact = adapter.settings.estimator == "contact"
         self._tip_known = adapter.layout.tip_slopes.shape != (0,)
         self._free = FreeRobots(adapter, count, threads) if self._contact or not self._tip_known else None
@@ -167,9 +169,13 @@ class ForceEstimator:
         if self._free is not None and free is not None:
             self._free.set_rows(robots, free)
 
+    def clear(self, index: EnvIndex) -> None:
+        """Set the estimates of robots that nothing touches to zero."""
+        self.chosen[index] = self.paper[index] = 0.0
+
     def update(self, robots: Sequence[int], measured: Measured) -> None:
         """Estimate anew for some robots that have moved."""
-        indices, learning = np.array(robots, int), self._learns and self._contact
+        indices, learning = np.array(robots, int), self.learns and self._contact
         touching = np.asarray(self._adapter.layout.flags(measured.blocks).any(axis=-1))
         self.chosen[indices[~touching]] = self.paper[indices[~touching]] = 0.0
         wanted = touching | learning

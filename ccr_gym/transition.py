@@ -233,6 +233,9 @@ class Transition:
 
     def _estimate(self, index: EnvIndex) -> None:
         """Estimate the forces of robots that have moved."""
+        if not (self._estimator.learns or self._layout.flags(self.batch.blocks[index]).any()):
+            self._estimator.clear(index)  # by far the most frequent case
+            return
         robots = np.atleast_1d(np.arange(self.count)[index]).tolist()
         self._estimator.update(robots, self._measured(self.batch.blocks[robots], self._encoders(robots), robots))
 
