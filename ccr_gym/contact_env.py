@@ -27,7 +27,7 @@ from solver.spatial import SpatialEquilibrium
 Info = dict[str, Any]  # Gymnasium's own type of infos and options
 RENDER_MODES = ["human", "rgb_array"]
 METADATA: Info = {"render_modes": RENDER_MODES, "render_fps": 20}
-SCALARS: dict[type, Callable[[Any], Any]] = {float: np.float64, int: np.int64, bool: np.bool_}
+SCALARS: dict[type, Callable[[Any], Any]] = {float: np.float64, int: np.int64, bool: bool}
 SPACES = {2: "the plane", 3: "space"}
 
 
@@ -253,7 +253,7 @@ def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others:
 
 
 def _numpy(infos: Info) -> Info:
-    """Return infos whose numbers have a dtype, which some clients look at."""
+    """Return infos whose numbers have a dtype, which some clients look at; others take no flag that has one."""
     return {key: SCALARS.get(type(value), np.asarray)(value) for key, value in infos.items()}
 
 
