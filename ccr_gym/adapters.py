@@ -82,6 +82,12 @@ class RobotAdapter(ABC, Generic[SettingsT]):
     def points(self, blocks: np.ndarray) -> np.ndarray:
         """Return the points that can touch, ``(..., lines, positions, d)`` [mm]."""
 
+    def force(self, blocks: np.ndarray, target: int | None) -> np.ndarray:
+        """Return the contact force of an obstacle, of all together for ``None``, ``(..., d)`` [N]."""
+        if target is None:
+            return self.layout.force(blocks)
+        return self.layout.forces(blocks)[..., target, :]
+
     @abstractmethod
     def pose_features(self) -> Features:
         """Return the observed features of the shape."""

@@ -19,7 +19,7 @@ from ccr_gym.readings import ForceReading, PrivilegedState
 from ccr_gym.reward import TERMS
 from ccr_gym.scales import Scales
 from ccr_gym.settings import AnySettings
-from ccr_gym.state import EnvState, check_state, restored
+from ccr_gym.state import EnvState, check_state, restored, state_of
 from ccr_gym.task import AnyTask, Assignment, check_force, check_task
 from solver import Equilibrium, Scene
 from solver.spatial import SpatialEquilibrium
@@ -144,8 +144,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         It holds nothing of the environment's arguments, and of no wrapper around it.
         """
         episodes = self._episodes.get_rows([0]) if self._started else None
-        generator = None if self._np_random is None else self._np_random.bit_generator.state
-        return EnvState(episodes, (generator,), np.zeros(1, int), np.zeros(1, bool))
+        return EnvState(episodes, (state_of(self._np_random),), np.zeros(1, int), np.zeros(1, bool))
 
     def set_state(self, state: EnvState) -> None:
         """Put the environment into a state of :meth:`get_state` of one with the same arguments.

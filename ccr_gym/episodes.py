@@ -42,7 +42,7 @@ class EpisodeBatch(Transition):
     def read(self, index: int | slice = ALL) -> ForceReading:
         """Return the present contact forces."""
         blocks, estimator = self.batch.blocks[index], self._estimator
-        nominal = self._forces(blocks)
+        nominal = self.adapter.force(blocks, self._target)
         chosen, paper = (
             np.asarray(factors[index])[..., None] * nominal for factors in (estimator.chosen, estimator.paper)
         )

@@ -112,7 +112,7 @@ class Observer:
 def _features(adapter: AnyAdapter, task: AnyTask) -> Features:
     """Return the entries that are read from the equilibrium block."""
     layout, columns = adapter.layout, np.arange(adapter.layout.size)
-    force = layout.force(columns) if task.target is None else layout.forces(columns)[task.target]
+    force = adapter.force(columns, task.target)
     return {
         "contact": Feature(layout.flags(columns), 1.0),
         "force_measured": Feature(force, 1 / (FORCE_SPAN * adapter.scales.force_n)),

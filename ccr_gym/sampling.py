@@ -145,7 +145,7 @@ class Trials:
             blocks = batch.blocks[moving]
             tensions, onsets = adapter.layout.tensions(blocks), adapter.layout.onset(blocks)
             estimator.update(moving, Measured(blocks, actuated, tensions, onsets))
-            forces = estimator.chosen[moving, None] * self._regulated(blocks)
+            forces = estimator.chosen[moving, None] * adapter.force(blocks, self._task.target)
             reached[going] = forces
             held = (norm(forces) >= wanted[going]) & (batch.statuses[moving] == Status.CONVERGED)
             ended = held | (batch.statuses[moving] != Status.CONVERGED)
@@ -157,10 +157,6 @@ class Trials:
         """Return actuated coordinates with these commands, at the length at rest, ``(k, actions)`` [mm]."""
         spare = self._adapter.actions.size - commands.shape[1]
         return np.pad(commands, ((0, 0), (0, spare)), constant_values=self._batch.robot.length_mm)
-
-    def _regulated(self, blocks: np.ndarray) -> np.ndarray:
-        layout, target = self._adapter.layout, self._task.target
-        return layout.force(blocks) if target is None else layout.forces(blocks)[..., target, :]
 
 
 def check_robot(task: AnyTask, robot: AnyRobot) -> None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Literal, TypeVar, cast
+from typing import Any, ClassVar, Generic, Literal, TypeVar, cast
 
 from ccr_gym.checks import (
     check_choice,
@@ -94,6 +94,8 @@ class BaseSettings(Generic[RobotT]):
         ValueError: If an argument is out of range; the message names the bound.
     """
 
+    robot_kind: ClassVar[type[Any]]
+
     robot: RobotT
     model: Literal["rod", "paper"] = checked("rod", check_choice, choices=("rod", "paper"))
     obs_mode: Literal["flat", "dict", "goal"] = checked("flat", check_choice, choices=("flat", "dict", "goal"))
@@ -148,7 +150,7 @@ class BaseSettings(Generic[RobotT]):
 
     def _make_robot(self) -> RobotT:
         """Return the robot, which may be given by name, by its fields, or not at all."""
-        kind, given = self._robot_kind(), cast("object", self.robot)
+        kind, given = self.robot_kind, cast("object", self.robot)
         if isinstance(given, kind):
             return cast("RobotT", given)
         if isinstance(given, str):
@@ -160,16 +162,13 @@ class BaseSettings(Generic[RobotT]):
             robot = self._preset("prototype")
         return cast("RobotT", robot)
 
-    def _robot_kind(self) -> type[Any]:
-        raise NotImplementedError
-
     def _preset(self, name: str) -> object:
         """Return a robot by its name; in the paper's model it keeps its sizes, rigidity and tension limit."""
         if self.model == "rod":
-            return self._robot_kind().preset(name)
+            return self.robot_kind.preset(name)
         row = PRESETS[name]
         kept = ("length_mm", "segments", "offset_mm", "rigidity", "max_tension")
-        return self._robot_kind()(model="paper", **{field: getattr(row, field) for field in kept})
+        return self.robot_kind(model="paper", **{field: getattr(row, field) for field in kept})
 
     def _derive(self, name: str, value: float) -> None:
         """Fill in a field that follows from the robot unless it is given."""
@@ -187,8 +186,7 @@ class Settings(BaseSettings[Robot]):
 
     robot: Robot = checked(cast("Robot", None), _check_robot, kind=Robot)
 
-    def _robot_kind(self) -> type[Robot]:
-        return Robot
+    robot_kind: ClassVar[type[Any]] = Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -225,14 +223,13 @@ class SpatialSettings(BaseSettings[SpatialRobot]):
         backend: ``"native"``; the reference solver does not give all that is observed in space.
     """
 
+    robot_kind: ClassVar[type[Any]] = SpatialRobot
+
     robot: SpatialRobot = checked(cast("SpatialRobot", None), _check_robot, kind=SpatialRobot)
 
     def __post_init__(self) -> None:
         BaseSettings.__post_init__(self)
         require(self.backend == "native", f"backend is {self.backend!r}; in space it must be 'native'")
-
-    def _robot_kind(self) -> type[SpatialRobot]:
-        return SpatialRobot
 
     def _preset(self, name: str) -> object:
         if self.model == "rod" and not PRESETS[name].cables:

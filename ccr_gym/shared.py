@@ -50,9 +50,7 @@ def masked(infos: Info, mask: np.ndarray) -> Info:
     """Return infos in Gymnasium's form: zero outside the mask, and the mask beside every entry."""
     found: Info = {}
     for key, value in infos.items():
-        if isinstance(value, dict):
-            found[key] = masked(value, mask)
-        elif mask.all():
+        if mask.all():
             found[key] = value
         else:
             found[key] = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type())

@@ -75,6 +75,11 @@ def check_state(state: object, count: int) -> None:
         raise ValueError(f"state is of {len(state.generators)} environments; it must be of {count}")
 
 
+def state_of(generator: np.random.Generator | None) -> Mapping[str, Any] | None:
+    """Return the state of a generator, None for none."""
+    return None if generator is None else generator.bit_generator.state
+
+
 def restored(generator: np.random.Generator | None, state: Mapping[str, Any] | None) -> np.random.Generator | None:
     """Return a generator in a state, the given one if there is one; None for none."""
     if state is None:

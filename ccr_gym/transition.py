@@ -250,12 +250,6 @@ class Transition:
         """Return the actuated coordinates that the encoders of the motors read, ``(..., actions)`` [mm]."""
         return np.asarray(self._actuated_mm[index] if self._sensors is None else self._sensors.motor_mm(index))
 
-    def _forces(self, blocks: np.ndarray) -> np.ndarray:
-        """Return the regulated contact force of robots of nominal rigidity, ``(..., d)`` [N]."""
-        if self._target is None:
-            return self._layout.force(blocks)
-        return self._layout.forces(blocks)[..., self._target, :]
-
     def probe(self, actuated_mm: np.ndarray) -> np.ndarray:
         """Return the contact forces that all robots would have at other actuated coordinates; nothing moves.
 
@@ -268,7 +262,7 @@ class Transition:
         commands, actuated_mm = self.batch.commands.copy(), self.adapter.bounded(actuated_mm)
         self.adapter.write_command(commands, actuated_mm, ALL)
         blocks = self.batch.probe(commands)
-        forces = self._forces(blocks)
+        forces = self.adapter.force(blocks, self._target)
         if self._settings.regulate == "estimate":
             factors = self._estimator.probe(self._measured(blocks, actuated_mm, ALL))
             return np.asarray(factors[:, None] * forces)

@@ -21,7 +21,7 @@ from ccr_gym.quantities import Quantity
 from ccr_gym.readings import PrivilegedState
 from ccr_gym.reward import TERMS
 from ccr_gym.shared import SharedAttributes, entry_of, masked
-from ccr_gym.state import EnvState, check_state, restored
+from ccr_gym.state import EnvState, check_state, restored, state_of
 from ccr_gym.task import MAX_STEPS, AnyTask
 from ccr_gym.tasks import TASKS, make_task
 from solver.common.validation import check_sequence, check_whole, is_listed
@@ -150,8 +150,8 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
     def get_state(self) -> EnvState:
         """Return the state of all episodes and generators, with which :meth:`set_state` goes on."""
         episodes = self._episodes.get_rows(list(range(self.num_envs))) if self._started else None
-        states = (None if generator is None else generator.bit_generator.state for generator in self._generators)
-        return EnvState(episodes, tuple(states), self._steps.copy(), self._ended.copy())
+        states = tuple(state_of(generator) for generator in self._generators)
+        return EnvState(episodes, states, self._steps.copy(), self._ended.copy())
 
     def set_state(self, state: EnvState) -> None:
         """Put all environments into a state of :meth:`get_state`; see :meth:`ccr_gym.ContactEnv.set_state`.
@@ -181,15 +181,9 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         wanted = check_array("indices", indices, (self.num_envs,)).astype(int)
         if not ((wanted == np.asarray(indices)) & (wanted >= 0) & (wanted < self.num_envs)).all():
             raise refusal("indices", indices, f"whole numbers from 0 to {self.num_envs - 1}")
-        state, chosen = self.get_state(), wanted.tolist()
-        self.set_state(
-            EnvState(
-                self._episodes.get_rows(chosen),
-                tuple(state.generators[i] for i in chosen),
-                state.steps[wanted],
-                state.ended[wanted],
-            )
-        )
+        chosen = wanted.tolist()
+        states = tuple(state_of(self._generators[i]) for i in chosen)
+        self.set_state(EnvState(self._episodes.get_rows(chosen), states, self._steps[wanted], self._ended[wanted]))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Return a picture of each environment, N of ``(H, W, 3)`` uint8."""
