@@ -19,6 +19,7 @@ from ccr_gym.envs import (
     SpatialPushEnv,
     TrackForceEnv,
 )
+from ccr_gym.randomization import Randomization
 from ccr_gym.readings import PrivilegedState
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
@@ -58,6 +59,7 @@ __all__ = [
     "PrivilegedState",
     "PushObstacle",
     "PushObstacleEnv",
+    "Randomization",
     "RewardWeights",
     "Scales",
     "Sensing",

@@ -170,7 +170,7 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
         """Return position and disk angle of every node."""
         robot = self.settings.robot
         nodes = self.layout.nodes(np.arange(self.layout.size)).ravel()
-        scale = np.tile(1 / np.array([robot.longest_mm, robot.longest_mm, np.pi]), robot.segments + 1)
+        scale = np.tile(1 / np.array([*2 * [self.settings.reach_mm], np.pi]), robot.segments + 1)
         return {"nodes": Feature(nodes, scale)}
 
 
@@ -222,13 +222,14 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
 
     def pose_features(self) -> Features:
         """Return the position of every node, and the first and last axis of its disk."""
-        robot, columns = self.settings.robot, np.arange(self.layout.size)
+        columns = np.arange(self.layout.size)
         axes = np.swapaxes(self.layout.frames(columns)[:, :, [0, 2]], 1, 2).ravel()
-        return {"frames": Feature(axes, 1.0), "nodes": Feature(self.layout.nodes(columns).ravel(), 1 / robot.length_mm)}
+        nodes = self.layout.nodes(columns).ravel()
+        return {"frames": Feature(axes, 1.0), "nodes": Feature(nodes, 1 / self.settings.reach_mm)}
 
     def obstacle_features(self, scene: Scene) -> np.ndarray:
         """Return centre, axis direction and radius of the first obstacle, in units of L, zeros where it has none."""
-        features, length = np.zeros(self.obstacle_size), self.scales.length_mm
+        features, length = np.zeros(self.obstacle_size), self.settings.reach_mm
         for obstacle in scene.obstacles[:1]:
             features[:3] = np.divide(obstacle.extent.center, length)
             if isinstance(obstacle, Capsule | Cylinder):

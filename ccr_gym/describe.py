@@ -53,7 +53,9 @@ def describe(task: AnyTask, title: str, description: str, start: str, *, action:
         "Arguments": f"""`render_mode`, the fields of `ccr_gym.settings.{type(settings).__name__}`, and `task`, given as
             `{type(task).__name__}` or as a mapping of its fields. Mappings make every argument JSON-able.
             `sensing="realistic"` adds backlash, latency, noise, bias, unknown friction and unknown rigidity, sampled
-            anew in every episode. `split="train"` and `split="test"` sample from disjoint sets of scenes.""",
+            anew in every episode. `randomize` draws the robot of every episode; the entry `robot` of
+            observation and `info` tells which it is. `split="train"` and `split="test"` sample from disjoint sets of
+            scenes.""",
         "Version History": "* v1: the rod, robots of any size; `-Paper-v1` is the paper's system to the letter.",
     }
     sections = [f"## {name}\n{_wrapped(text)}" for name, text in parts.items()]

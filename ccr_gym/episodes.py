@@ -77,7 +77,8 @@ class EpisodeBatch(Transition):
             measured = inputs["force_measured"] = measured + self._sensors.force_error(self._time, index)
             force = as_scalar(norm(measured), index)
         inputs["force_error"] = reading.goal - (measured if self._vector else force)
-        rows = self.observer.rows(reading.blocks, inputs, self._obstacle_features[index])
+        constants = {"obstacle": self._obstacle_features[index], "robot": self._robot_features[index]}
+        rows = self.observer.rows(reading.blocks, inputs, constants)
         if self._sensors is not None:
             rows = self._sensors.apply_latency(rows, self._time, index)
         self.observer.write_encoders(rows, self._encoders(index))
@@ -127,6 +128,7 @@ class EpisodeBatch(Transition):
                 0.0, as_scalar(norm(reading.force_true), index) - self._settings.force_limit
             ),
             "is_success": reading.error <= SUCCESS_ERROR,
+            **({"robot": self._drawn[index].copy()} if self._settings.randomize else {}),
             **({"obstacle_mm": self.obstacles_moved_mm(index)} if self._task.obstacles_move else {}),
             **{f"reward_{name}": term for name, term in zip(TERMS, terms, strict=True)},
         }

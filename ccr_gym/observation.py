@@ -7,6 +7,7 @@ from gymnasium import spaces
 
 from ccr_gym.adapters import AnyAdapter, Feature, Features
 from ccr_gym.quantities import Quantity
+from ccr_gym.randomization import DRAWN_SIZE
 from ccr_gym.scales import AHEAD, FORCE_SPAN
 from ccr_gym.sensing import DELAYED_KEYS
 from ccr_gym.task import AnyTask
@@ -61,13 +62,15 @@ class Observer:
         most = np.maximum(np.abs(adapter.actions.low_mm), adapter.actions.high_mm)
         self._encoder_scale = 1 / most
 
-    def rows(self, blocks: np.ndarray, forces: Mapping[str, Quantity], obstacle: np.ndarray) -> np.ndarray:
+    def rows(
+        self, blocks: np.ndarray, forces: Mapping[str, Quantity], constants: Mapping[str, np.ndarray]
+    ) -> np.ndarray:
         """Return flat observations before they are clipped, ``(k,)`` for one robot, ``(N, k)`` for many.
 
         Args:
             blocks: Equilibria, ``(size,)`` or ``(N, size)``.
             forces: Inputs that are forces, numbers or ``(..., d)`` [N].
-            obstacle: Features of the obstacle, ``(..., obstacle_size)``.
+            constants: Inputs that stay as they are in an episode, scaled already, ``(..., k)``.
         """
         one = blocks.ndim == 1
         rows = blocks.take(self._source) if one else blocks[:, self._source]
@@ -76,8 +79,9 @@ class Observer:
             columns = self._input_columns.get(key)
             if columns is not None:  # one row is written faster without an ellipsis
                 rows[columns if one else (..., columns)] = force / self._force_n
-        if "obstacle" in self._input_columns:
-            rows[..., self._input_columns["obstacle"]] = obstacle
+        for key, features in constants.items():
+            if (columns := self._input_columns.get(key)) is not None:
+                rows[..., columns] = features
         return rows
 
     def write_encoders(self, rows: np.ndarray, motor_mm: np.ndarray) -> None:
@@ -133,6 +137,8 @@ def _input_sizes(adapter: AnyAdapter, task: AnyTask) -> dict[str, int]:
         sizes["force_measured"] = adapter.space  # with noise or estimated, so not the block's
     if adapter.obstacle_size:
         sizes["obstacle"] = adapter.obstacle_size
+    if adapter.settings.randomize and adapter.settings.randomize.observed:
+        sizes["robot"] = DRAWN_SIZE
     return sizes
 
 

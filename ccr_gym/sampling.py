@@ -9,6 +9,7 @@ from ccr_gym.adapters import AnyAdapter
 from ccr_gym.checks import check_array, check_type, refusal
 from ccr_gym.estimation import ForceEstimator, Measured
 from ccr_gym.quantities import norm
+from ccr_gym.randomization import Drawn
 from ccr_gym.scales import FORCE_SPAN, Scales
 from ccr_gym.sensing import Imperfections
 from ccr_gym.settings import AnySettings
@@ -47,6 +48,7 @@ class Trials:
         robots: Sequence[int],
         generators: Sequence[np.random.Generator],
         imperfections: Sequence[Imperfections | None],
+        drawn: Sequence[Drawn],
     ) -> tuple[np.ndarray, list[Assignment]]:
         """Return a feasible assignment for each of some robots, sampled by a generator of its own.
 
@@ -57,6 +59,7 @@ class Trials:
             robots: Indices of k robots.
             generators: One generator for each of them.
             imperfections: Imperfections of their episodes, whose rigidity and play limit what can be reached.
+            drawn: What the robots of the episodes are.
 
         Returns:
             Set-points ``(k, 1)``, or ``(k, d)`` where they are vectors [N], and the assignments.
@@ -70,8 +73,9 @@ class Trials:
         assignments: dict[int, Assignment] = {}
         waiting = list(range(len(robots)))
         for _ in range(MAX_SAMPLES):
-            sampled = {k: _sample_split(self._task, self._batch.robot, generators[k], self._split) for k in waiting}
-            clear = [k for k in waiting if self._place(robots[k], sampled[k].scene)]
+            own = {k: drawn[k].robot or self._batch.robot for k in waiting}
+            sampled = {k: _sample_split(self._task, own[k], generators[k], self._split) for k in waiting}
+            clear = [k for k in waiting if self._place(robots[k], sampled[k].scene, drawn[k])]
             if not clear:
                 continue
             found, forces = self._pull(
@@ -99,11 +103,11 @@ class Trials:
         play = 0.0 if sensors is None else sensors.backlash[1] * self._adapter.scales.travel_mm
         return max(self._settings.cable_limit_mm - play, 0.5 * self._settings.cable_limit_mm) * actuation.sections
 
-    def _place(self, robot: int, scene: Scene) -> bool:
+    def _place(self, robot: int, scene: Scene, drawn: Drawn) -> bool:
         """Put a robot among obstacles if they leave it clear, and return whether they do."""
-        clear = self._batch.leaves_clear(scene)
+        clear = self._batch.leaves_clear(scene, drawn.robot)
         if clear:
-            self._batch.assign(robot, scene)
+            self._batch.assign(robot, scene, drawn.robot)
         return clear
 
     def _pull(
@@ -120,10 +124,11 @@ class Trials:
         else:
             increment = PULL * self._adapter.scales.travel_mm
             found, reached = self._batch.ramp_reaches_force(robots, wanted, increment, limit, pulls, self._task.target)
+        shown = FORCE_SPAN * self._adapter.scales.force_n
         if not self._task.force_vector:
-            return found, forces[:, None]
+            return found & (forces <= shown), forces[:, None]
         goals = reached * (ratio / MARGIN)[:, None]
-        return found & (norm(goals) <= FORCE_SPAN * self._adapter.scales.force_n), goals
+        return found & (norm(goals) <= shown), goals
 
     def _pull_by_estimate(
         self, robots: list[int], wanted: np.ndarray, limit: float, bending: np.ndarray
@@ -133,13 +138,14 @@ class Trials:
         assert estimator is not None
         batch.rest(robots)
         estimator.rest(robots)
-        rows, pulled = np.array(robots), 0.0
+        rows, pulled, lengths = np.array(robots), 0.0, adapter.layout.length(batch.blocks[robots])
         found, reached = np.zeros(len(rows), bool), np.zeros((len(rows), adapter.space))
         going = np.ones(len(rows), bool)
         while going.any() and pulled < limit:
             pulled = min(pulled + PULL * adapter.scales.travel_mm, limit)
             moving = rows[going].tolist()
-            actuated = adapter.bounded(self._actuated(pulled * adapter.actuation.steady(bending[going])))
+            commands = pulled * adapter.actuation.steady(bending[going])
+            actuated = adapter.bounded(self._actuated(commands, lengths[going]))
             adapter.write_command(batch.commands, actuated, moving)
             batch.move(moving)
             blocks = batch.blocks[moving]
@@ -153,10 +159,10 @@ class Trials:
             going[going] = ~ended
         return found, reached
 
-    def _actuated(self, commands: np.ndarray) -> np.ndarray:
-        """Return actuated coordinates with these commands, at the length at rest, ``(k, actions)`` [mm]."""
+    def _actuated(self, commands: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """Return actuated coordinates with these commands and lengths, ``(k, actions)`` [mm]."""
         spare = self._adapter.actions.size - commands.shape[1]
-        return np.pad(commands, ((0, 0), (0, spare)), constant_values=self._batch.robot.length_mm)
+        return np.concatenate([commands, lengths[:, :spare]], axis=1)
 
 
 def check_robot(task: AnyTask, robot: AnyRobot) -> None:

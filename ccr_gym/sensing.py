@@ -31,6 +31,7 @@ STATE = (
     "_history_empty",
     "rigidity_ratio",
 )  # arrays of a SensorModel
+MAX_LOSS = 0.9  # share of the tension that friction takes at most
 HISTORY = 8  # observations kept, more than the largest latency
 NOISE_STEPS = 256  # steps after which the noise of an episode repeats
 
@@ -56,11 +57,14 @@ class Sensing:
     noise: Range = checked((0.01, 0.03), check_range, low=0)
     bias: Range = checked((0.0, 0.06), check_range, low=0)
     backlash: Range = checked((0.025, 0.075), check_range, low=0)
-    tendon_loss: Range = checked((0.0, 0.3), check_range, low=0, high=0.9)
+    tendon_loss: Range = checked((0.0, 0.3), check_range, low=0, high=MAX_LOSS)
     rigidity_ratio: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+EXACT = Sensing(latency=(0, 0), noise=(0, 0), bias=(0, 0), backlash=(0, 0), tendon_loss=(0, 0), rigidity_ratio=(1, 1))
 
 
 class Imperfections(NamedTuple):

@@ -17,9 +17,10 @@ from ccr_gym.checks import (
     refusal,
     require,
 )
+from ccr_gym.randomization import Randomization
 from ccr_gym.reward import RewardWeights
 from ccr_gym.scales import Scales
-from ccr_gym.sensing import Sensing
+from ccr_gym.sensing import EXACT, Sensing
 from solver import PRESETS, Actuation, Cable, Robot
 from solver.common.validation import SMALLEST
 from solver.spatial import SpatialRobot
@@ -87,6 +88,8 @@ class BaseSettings(Generic[RobotT]):
         weights: Weights of the reward terms, or a mapping of names to weights.
         backend: ``"native"``, or ``"casadi"`` for the reference solver, which is slow.
         sensing: ``"ideal"``, ``"realistic"``, or a :class:`ccr_gym.Sensing` or mapping of its fields.
+        randomize: A :class:`ccr_gym.Randomization` or mapping of its fields: every episode draws its own robot, and the
+            estimator learns its rigidity; ``None`` for the same robot in all.
         split: Scenes to sample: ``"train"``, ``"test"``, or ``"all"``; training and test scenes are disjoint.
 
     Raises:
@@ -109,6 +112,7 @@ class BaseSettings(Generic[RobotT]):
     weights: RewardWeights = nested(RewardWeights)
     backend: Literal["native", "casadi"] = checked("native", check_choice, choices=("native", "casadi"))
     sensing: str | Sensing = checked("ideal", check_sensing)
+    randomize: Randomization | None = derived(check_instance, kind=Randomization)
     split: Literal["all", "train", "test"] = checked("all", check_choice, choices=("all", "train", "test"))
 
     def __post_init__(self) -> None:
@@ -130,6 +134,7 @@ class BaseSettings(Generic[RobotT]):
             f"max_increment_mm is {self.max_increment_mm}; it must be at most {self.cable_limit_mm:.6g}, "
             "the cable_limit_mm",
         )
+        self._check_randomized()
 
     @property
     def scales(self) -> Scales:
@@ -143,10 +148,30 @@ class BaseSettings(Generic[RobotT]):
 
     @property
     def sensors(self) -> Sensing | None:
-        """Ranges of the imperfections, or ``None`` where sensing is ideal."""
-        if self.sensing == "realistic":
-            return Sensing()
-        return self.sensing if isinstance(self.sensing, Sensing) else None
+        """Ranges of the imperfections, or ``None`` where sensing is ideal and the robot known."""
+        given = Sensing() if self.sensing == "realistic" else self.sensing
+        ranges = given if isinstance(given, Sensing) else None
+        if self.randomize is None:
+            return ranges
+        loss = self.randomize.tendon_loss
+        ranges = ranges or EXACT
+        return ranges if loss is None else replace(ranges, tendon_loss=loss)
+
+    @property
+    def reach_mm(self) -> float:
+        """Largest length of a robot [mm]."""
+        return self.robot.longest_mm * (self.randomize.length[1] if self.randomize else 1.0)
+
+    def _check_randomized(self) -> None:
+        """Check that all robots that can be drawn can be made, and carry out all commands."""
+        if self.randomize is None:
+            return
+        require(self.backend == "native", f"backend is {self.backend!r}; with randomize it must be 'native'")
+        try:
+            for _ in self.randomize.corners(self.robot):
+                pass
+        except ValueError as error:
+            raise ValueError(f"randomize has robots that are refused: {error}") from error
 
     def _make_robot(self) -> RobotT:
         """Return the robot, which may be given by name, by its fields, or not at all."""

@@ -12,6 +12,7 @@ from ccr_gym.checks import require
 from ccr_gym.estimation import ForceEstimator, Measured
 from ccr_gym.observation import Observer
 from ccr_gym.quantities import EnvIndex, norm
+from ccr_gym.randomization import DRAWN_SIZE, Drawn
 from ccr_gym.sampling import Trials, check_robot
 from ccr_gym.sensing import Imperfections, SensorModel, sample_imperfections
 from ccr_gym.settings import AnySettings
@@ -31,6 +32,8 @@ STATE = (
     "_actuated_mm",
     "_last_actions",
     "_obstacle_features",
+    "_drawn",
+    "_robot_features",
     "_time",
 )
 
@@ -73,7 +76,8 @@ class Transition:
     """
 
     def __init__(self, task: AnyTask, settings: AnySettings, count: int, threads: int = 1) -> None:
-        check_robot(task, settings.robot)
+        for robot in [settings.robot] if settings.randomize is None else settings.randomize.corners(settings.robot):
+            check_robot(task, robot)
         self._task, self._settings, self.count, self._threads = task, settings, count, threads
         self._target, self._vector = task.target, task.force_vector
         self._trials = Trials(task, settings, count, threads)
@@ -86,6 +90,8 @@ class Transition:
         self._starts: list[Scene | None] = [None] * count  # scenes at the start of the episodes
         self._actuated_mm, self._last_actions = np.zeros((count, actions)), np.zeros((count, actions))
         self._obstacle_features = np.zeros((count, self.adapter.obstacle_size))
+        self._drawn = np.ones((count, DRAWN_SIZE))  # what the robots are
+        self._robot_features = np.zeros((count, DRAWN_SIZE))
         self._time = np.zeros(count, int)  # steps of the episode
 
     def _make_pipeline(self, obstacles: int) -> Pipeline:
@@ -123,19 +129,22 @@ class Transition:
             RuntimeError: As :func:`ccr_gym.sampling.sample_feasible`; episodes and generators remain as they were.
         """
         with _restored_on_error(generators):
-            imperfections = [self._sample_imperfections(generator) for generator in generators]
-            forces, assignments = self._trials.sample_feasible(robots, generators, imperfections)
+            imperfections, drawn = zip(*map(self._sample_hidden, generators), strict=True)
+            forces, assignments = self._trials.sample_feasible(robots, generators, imperfections, drawn)
         self._use(self._pipeline_for(self._task.obstacles))
-        for robot, assignment in zip(robots, assignments, strict=True):
-            self.batch.assign(robot, assignment.scene)
-        self._start(robots, forces, assignments, imperfections)
+        for robot, assignment, own in zip(robots, assignments, drawn, strict=True):
+            self.batch.assign(robot, assignment.scene, own.robot)
+        self._start(robots, forces, assignments, imperfections, drawn)
 
-    def _sample_imperfections(self, generator: np.random.Generator) -> Imperfections | None:
-        """Return the imperfections of an episode, sampled aside so that scenes are the same whatever the sensing."""
-        ranges, seed = self._settings.sensors, int(generator.integers(SEEDS))
-        if ranges is None:
-            return None
-        return sample_imperfections(ranges, self._settings.scales, self.adapter.space, np.random.default_rng(seed))
+    def _sample_hidden(self, generator: np.random.Generator) -> tuple[Imperfections | None, Drawn]:
+        """Return imperfections and robot of an episode, sampled aside so that scenes are the same whatever they are."""
+        settings, seed = self._settings, int(generator.integers(SEEDS))
+        if settings.sensors is None:
+            return None, Drawn()
+        aside = np.random.default_rng(seed)
+        sampled = sample_imperfections(settings.sensors, settings.scales, self.adapter.space, aside)
+        ranges = settings.randomize
+        return sampled, Drawn() if ranges is None else ranges.sample(settings.robot, sampled.tendon_loss, aside)
 
     def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
         """Start a given episode of a robot; its generator samples the imperfections.
@@ -147,10 +156,11 @@ class Transition:
         obstacles, least = len(assignment.scene), 1 if self._target is None else self._target + 1
         require(obstacles >= least, f"the scene has {obstacles} obstacles; it must have at least {least}")
         pipeline = self._pipeline_for(obstacles)
-        pipeline.batch.assign(robot, assignment.scene)
+        with _restored_on_error([generator]):
+            imperfections, drawn = self._sample_hidden(generator)
+            pipeline.batch.assign(robot, assignment.scene, drawn.robot)
         self._use(pipeline)
-        imperfections = [self._sample_imperfections(generator)]
-        self._start([robot], np.atleast_2d(assignment.desired_force), [assignment], imperfections)
+        self._start([robot], np.atleast_2d(assignment.desired_force), [assignment], [imperfections], [drawn])
 
     def _start(
         self,
@@ -158,6 +168,7 @@ class Transition:
         forces: np.ndarray,
         assignments: Sequence[Assignment],
         imperfections: Sequence[Imperfections | None],
+        drawn: Sequence[Drawn],
     ) -> None:
         """Start episodes of robots that are among their obstacles, with set-points ``(k, 1)`` or ``(k, d)`` [N]."""
         self._desired_n[robots] = forces[:, 0]
@@ -168,6 +179,9 @@ class Transition:
         self._estimator.rest(robots)
         self._last_actions[robots], self._time[robots] = 0.0, 0
         self._actuated_mm[robots] = self.adapter.actuated_mm(self.batch.blocks[robots], self._actuated_mm[robots] * 0.0)
+        if (ranges := self._settings.randomize) is not None and self._settings.sensors is not None:
+            self._drawn[robots] = [own.numbers for own in drawn]
+            self._robot_features[robots] = ranges.features(self._drawn[robots], self._settings.sensors.tendon_loss)
         for robot, assignment, sampled in zip(robots, assignments, imperfections, strict=True):
             self._starts[robot] = assignment.scene
             if self._motions_mm is not None:
