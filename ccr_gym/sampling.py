@@ -15,6 +15,7 @@ from ccr_gym.sensing import Imperfections
 from ccr_gym.settings import AnySettings
 from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment, check_force
 from solver import Scene, Status
+from solver.common.batch import BaseBatch
 from solver.common.checks import check_core
 from solver.common.robot import AnyRobot
 
@@ -31,17 +32,15 @@ class Trials:
     Args:
         task: The task that samples.
         settings: Settings of the environment.
-        count: Number N of robots.
-        threads: Threads of the solver.
+        batch: The robots.
+        adapter: Their adapter.
     """
 
-    def __init__(self, task: AnyTask, settings: AnySettings, count: int, threads: int) -> None:
-        self._task, self._settings = task, settings
-        self._batch = task.adapter.make_batch(settings, count, task.obstacles, threads)
-        self._adapter: AnyAdapter = task.adapter(settings, self._batch.layout)
+    def __init__(self, task: AnyTask, settings: AnySettings, batch: BaseBatch, adapter: AnyAdapter) -> None:
+        self._task, self._settings, self._batch, self._adapter = task, settings, batch, adapter
         self._estimator = None
         if settings.regulate == "estimate":
-            self._estimator = ForceEstimator(self._adapter, count, threads, learns=False)
+            self._estimator = ForceEstimator(adapter, batch.count, batch.threads, learns=False)
 
     def sample_feasible(
         self,
@@ -51,6 +50,8 @@ class Trials:
         drawn: Sequence[Drawn],
     ) -> tuple[np.ndarray, list[Assignment]]:
         """Return a feasible assignment for each of some robots, sampled by a generator of its own.
+
+        The robots are among the obstacles then, in no equilibrium yet; whatever is raised, they are where they were.
 
         An assignment is feasible if its obstacles leave the straight robot clear and pulling the cables steadily
         reaches the set-point, with a margin, without a stall, block or snap. Infeasible ones are sampled again.

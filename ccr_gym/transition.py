@@ -80,8 +80,9 @@ class Transition:
             check_robot(task, robot)
         self._task, self._settings, self.count, self._threads = task, settings, count, threads
         self._target, self._vector = task.target, task.force_vector
-        self._trials = Trials(task, settings, count, threads)
-        self._use(self._make_pipeline(task.obstacles))
+        self._own = self._make_pipeline(task.obstacles)
+        self._trials = Trials(task, settings, self._own.batch, self._own.adapter)
+        self._use(self._own)
         actions, space = self.adapter.actions.size, self.adapter.space
         self._desired_n = np.ones(count)  # magnitudes of the set-points, the largest ones where they move
         self._goal_n = np.ones((count, space))  # the set-points where they are vectors
@@ -105,10 +106,11 @@ class Transition:
         return Pipeline(batch, adapter, observer, estimator, sensors)
 
     def _pipeline_for(self, obstacles: int) -> Pipeline:
-        """Return the present pipeline, or a new one for another number of obstacles."""
+        """Return the present pipeline, that of the task, or a new one for another number of obstacles."""
         present = self._pipeline.batch.layout.obstacles
-        if obstacles == present:
-            return self._pipeline
+        for pipeline in (self._pipeline, self._own):
+            if obstacles == pipeline.batch.layout.obstacles:
+                return pipeline
         require(self.count == 1, f"all scenes of several robots must have {present} obstacles")
         return self._make_pipeline(obstacles)
 
@@ -128,12 +130,10 @@ class Transition:
         Raises:
             RuntimeError: As :func:`ccr_gym.sampling.sample_feasible`; episodes and generators remain as they were.
         """
-        with _restored_on_error(generators):
+        with _restored_on_error(generators, self._own.batch, robots):
             imperfections, drawn = zip(*map(self._sample_hidden, generators), strict=True)
             forces, assignments = self._trials.sample_feasible(robots, generators, imperfections, drawn)
-        self._use(self._pipeline_for(self._task.obstacles))
-        for robot, assignment, own in zip(robots, assignments, drawn, strict=True):
-            self.batch.assign(robot, assignment.scene, own.robot)
+        self._use(self._own)
         self._start(robots, forces, assignments, imperfections, drawn)
 
     def _sample_hidden(self, generator: np.random.Generator) -> tuple[Imperfections | None, Drawn]:
@@ -156,7 +156,7 @@ class Transition:
         obstacles, least = len(assignment.scene), 1 if self._target is None else self._target + 1
         require(obstacles >= least, f"the scene has {obstacles} obstacles; it must have at least {least}")
         pipeline = self._pipeline_for(obstacles)
-        with _restored_on_error([generator]):
+        with _restored_on_error([generator], pipeline.batch, [robot]):
             imperfections, drawn = self._sample_hidden(generator)
             pipeline.batch.assign(robot, assignment.scene, drawn.robot)
         self._use(pipeline)
@@ -313,12 +313,15 @@ class Transition:
 
 
 @contextmanager
-def _restored_on_error(generators: Sequence[np.random.Generator]) -> Iterator[None]:
-    """Restore the states of generators after any exception."""
-    states = [generator.bit_generator.state for generator in generators]
+def _restored_on_error(
+    generators: Sequence[np.random.Generator], batch: BaseBatch, robots: Sequence[int]
+) -> Iterator[None]:
+    """Restore the states of generators and robots after any exception."""
+    states, rows = [generator.bit_generator.state for generator in generators], batch.get_rows(list(robots))
     try:
         yield
     except BaseException:
         for generator, state in zip(generators, states, strict=True):
             generator.bit_generator.state = state
+        batch.set_rows(list(robots), rows)
         raise

@@ -196,9 +196,7 @@ class Robot:
     @property
     def lines_mm(self) -> tuple[float, ...]:
         """Distances of the lines of ``touch`` from the backbone, towards the cable [mm]."""
-        cables = dict.fromkeys(math.copysign(cable.offset_mm or 0.0, cable.hole_mm[0]) for cable in full_cables(self))
-        distances = {"backbone": (0.0,), "cable": tuple(cables), "rim": (-self.offset_mm,)}
-        return tuple(dict.fromkeys(distance for line in self.touch for distance in distances[line]))
+        return _lines(self)
 
     @property
     def positions(self) -> int:
@@ -236,6 +234,13 @@ class Robot:
         """``max_cable_mm`` with its default filled in [mm]."""
         assert self.max_cable_mm is not None
         return self.max_cable_mm
+
+
+@lru_cache(maxsize=64)
+def _lines(robot: Robot) -> tuple[float, ...]:
+    cables = dict.fromkeys(math.copysign(cable.offset_mm or 0.0, cable.hole_mm[0]) for cable in full_cables(robot))
+    distances = {"backbone": (0.0,), "cable": tuple(cables), "rim": (-robot.offset_mm,)}
+    return tuple(dict.fromkeys(distance for line in robot.touch for distance in distances[line]))
 
 
 @lru_cache(maxsize=64)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -190,13 +191,7 @@ class SpatialRobot:
     @property
     def lines_mm(self) -> np.ndarray:
         """Positions on the disk of the lines of ``touch``, ``(p, 2)`` [mm]."""
-        turns = 2 * math.pi / self.rim_points * np.arange(self.rim_points)
-        positions = {
-            "backbone": np.zeros((1, 2)),
-            "holes": self.cable_holes_mm,
-            "rim": self.offset_mm * np.column_stack([np.cos(turns), np.sin(turns)]),
-        }
-        return np.concatenate([positions[line] for line in self.touch])
+        return _lines(self)
 
     @property
     def line_weights(self) -> np.ndarray:
@@ -241,17 +236,35 @@ class SpatialRobot:
         A segment of the paper's model shears at most up to where its cable has no more length to give; one of the rod
         bends and twists at most up to where its disks meet.
         """
-        if self.model == "rod":
-            reaches = np.linalg.norm(self.lines_mm, axis=1)
-            widest = widest_bend(self.segment_mm, self.edge_mm, self.disk_thickness_mm)
-            longest = [longest_arc_edge(self.segment_mm, reach, widest) for reach in reaches]
-            return tuple(max(self.segment_mm, length) / (self.between + 1) for length in longest)
-        segment, shared = self.segment_mm, self.cable_limit_mm / self.segments
-        turned = math.sqrt(segment**2 - (segment - shared) ** 2)
-        stretched = np.abs(self.line_weights).sum(axis=1) * turned
-        return tuple(((segment + stretched) / (self.between + 1)).tolist())
+        return _longest_edges(self)
 
     @property
     def energy_scale(self) -> float:
         """Scale B = EI / 2 l0 [N·mm] of the elastic energy, B times the objective [rad²]."""
         return self.rigidity / (2 * self.segment_mm)
+
+
+@lru_cache(maxsize=64)
+def _lines(robot: SpatialRobot) -> np.ndarray:
+    turns = 2 * math.pi / robot.rim_points * np.arange(robot.rim_points)
+    positions = {
+        "backbone": np.zeros((1, 2)),
+        "holes": robot.cable_holes_mm,
+        "rim": robot.offset_mm * np.column_stack([np.cos(turns), np.sin(turns)]),
+    }
+    lines = np.concatenate([positions[line] for line in robot.touch])
+    lines.setflags(write=False)
+    return lines
+
+
+@lru_cache(maxsize=64)
+def _longest_edges(robot: SpatialRobot) -> tuple[float, ...]:
+    segment = robot.segment_mm
+    if robot.model == "rod":
+        reaches = np.linalg.norm(robot.lines_mm, axis=1)
+        widest = widest_bend(segment, robot.edge_mm, robot.disk_thickness_mm)
+        longest = [longest_arc_edge(segment, reach, widest) for reach in reaches]
+        return tuple(max(segment, length) / (robot.between + 1) for length in longest)
+    turned = math.sqrt(segment**2 - (segment - robot.cable_limit_mm / robot.segments) ** 2)
+    stretched = np.abs(robot.line_weights).sum(axis=1) * turned
+    return tuple(((segment + stretched) / (robot.between + 1)).tolist())
