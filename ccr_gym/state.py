@@ -8,7 +8,7 @@ import numpy as np
 
 from ccr_gym.checks import check_type
 from solver import Scene
-from solver.common.rows import Rows
+from solver.common.rows import Rows, as_slice, copied
 
 Arrays = dict[str, np.ndarray]
 
@@ -53,13 +53,15 @@ class EnvState:
 
 def take(owner: object, names: tuple[str, ...], robots: list[int]) -> Arrays:
     """Return copies of the rows of arrays that are attributes of an object."""
-    return {name: getattr(owner, name)[robots] for name in names if getattr(owner, name) is not None}
+    at = as_slice(robots)
+    return {name: copied(rows, at) for name in names if (rows := getattr(owner, name)) is not None}
 
 
 def put(owner: object, arrays: Arrays, robots: list[int]) -> None:
     """Write rows of arrays that are attributes of an object."""
+    at = as_slice(robots)
     for name, rows in arrays.items():
-        getattr(owner, name)[robots] = rows
+        getattr(owner, name)[at] = rows
 
 
 def check_state(state: object, count: int) -> None:
