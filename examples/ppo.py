@@ -29,7 +29,7 @@ class Args:
     """Environment to train on."""
     seed: int = 0
     """Seed of the learner and of the first environment's scenes."""
-    steps: int = 100_000
+    steps: int = 80_000
     """Environment steps to train for, rounded up to whole updates."""
     envs: int = 32
     """Environments stepped in parallel."""
