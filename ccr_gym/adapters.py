@@ -13,6 +13,7 @@ from solver import BatchSolver, ReferenceBatch, Scene, Solver
 from solver.common.batch import BaseBatch
 from solver.common.geometry import subdivide
 from solver.common.layout import Layout
+from solver.common.robot import AnyRobot
 from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialSolver
 
 SettingsT = TypeVar("SettingsT", bound=AnySettings)
@@ -60,8 +61,6 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         self.settings, self.layout = settings, layout
         self.actuation, self.scales = settings.actuation, settings.scales
         self.actions = self._action_spec()
-        lines = np.array(settings.robot.lines_mm)
-        self._lines_mm = lines.reshape(len(lines), 1, -1)  # across the disks
 
     @classmethod
     @abstractmethod
@@ -78,9 +77,20 @@ class RobotAdapter(ABC, Generic[SettingsT]):
             ValueError: As the solver.
         """
 
+    @staticmethod
+    def lines_mm(robot: AnyRobot) -> np.ndarray:
+        """Return the positions of a robot's lines across its disks, ``(lines, 1, d − 1)`` [mm]."""
+        lines = np.array(robot.lines_mm)
+        return lines.reshape(len(lines), 1, -1)
+
     @abstractmethod
-    def points(self, blocks: np.ndarray) -> np.ndarray:
-        """Return the points that can touch, ``(..., lines, positions, d)`` [mm]."""
+    def points(self, blocks: np.ndarray, lines_mm: np.ndarray) -> np.ndarray:
+        """Return the points that can touch, ``(..., lines, positions, d)`` [mm].
+
+        Args:
+            blocks: Equilibria, ``(..., size)``.
+            lines_mm: Positions of the lines, as of :meth:`lines_mm`, of each robot or of all [mm].
+        """
 
     def force(self, blocks: np.ndarray, target: int | None) -> np.ndarray:
         """Return the contact force of an obstacle, of all together for ``None``, ``(..., d)`` [N]."""
@@ -160,10 +170,10 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
         """Raise an error if the robot cannot be put among these obstacles; see the base class."""
         Solver(settings.robot, scene)
 
-    def points(self, blocks: np.ndarray) -> np.ndarray:
-        """Return the points that can touch, ``(..., lines, positions, 2)`` [mm]."""
+    def points(self, blocks: np.ndarray, lines_mm: np.ndarray) -> np.ndarray:
+        """Return the points that can touch, ``(..., lines, positions, 2)`` [mm]; see the base class."""
         nodes, axes = self.layout.nodes(blocks), self.layout.frames(blocks)
-        lines = nodes[..., None, :, :2] + self._lines_mm * axes[..., None, :, :]
+        lines = nodes[..., None, :, :2] + lines_mm * axes[..., None, :, :]
         return subdivide(lines, self.settings.robot.between)
 
     def pose_features(self) -> Features:
@@ -214,10 +224,10 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
         """Raise an error if the robot cannot be put among these obstacles; see the base class."""
         SpatialSolver(settings.robot, scene)
 
-    def points(self, blocks: np.ndarray) -> np.ndarray:
-        """Return the points that can touch, ``(..., lines, positions, 3)`` [mm]."""
+    def points(self, blocks: np.ndarray, lines_mm: np.ndarray) -> np.ndarray:
+        """Return the points that can touch, ``(..., lines, positions, 3)`` [mm]; see the base class."""
         nodes, frames = self.layout.nodes(blocks)[..., None, :, :], self.layout.frames(blocks)[..., None, :, :, :]
-        lines = nodes + self._lines_mm[..., :1] * frames[..., 0] + self._lines_mm[..., 1:] * frames[..., 1]
+        lines = nodes + lines_mm[..., :1] * frames[..., 0] + lines_mm[..., 1:] * frames[..., 1]
         return subdivide(lines, self.settings.robot.between)
 
     def pose_features(self) -> Features:

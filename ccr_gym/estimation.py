@@ -10,7 +10,7 @@ loads are served alike.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -76,12 +76,19 @@ class FreeRobots:
         self._batch = adapter.make_batch(adapter.settings, self._rows.size, 0, threads)
         self._adapter = type(adapter)(adapter.settings, self._batch.layout)
         self._step = DIFFERENCE * adapter.scales.travel_mm
+        lines = adapter.lines_mm(adapter.settings.robot)
+        self._lines_mm = np.tile(lines, (count, 1, 1, 1, 1))  # of each robot, alike for its companions
         for row in range(self._rows.size):
             self._batch.assign(row, Scene())
         self._batch.rest(range(self._rows.size))
 
-    def rest(self, robots: Sequence[int] | np.ndarray) -> None:
-        """Bring some robots to rest."""
+    def rest(self, robots: Sequence[int], drawn: Sequence[Any]) -> None:
+        """Bring some robots to rest, and let them be those that are drawn; ``None`` for the nominal robot."""
+        for robot, own in zip(robots, drawn, strict=True):
+            if own is not None:
+                self._lines_mm[robot] = self._adapter.lines_mm(own)
+                for row in self._rows[robot].tolist():
+                    self._batch.assign(row, Scene(), own)
         self._batch.rest(self._rows[robots].ravel().tolist())
 
     def get_rows(self, robots: list[int]) -> Rows:
@@ -97,13 +104,13 @@ class FreeRobots:
         rows = self._rows[robots].ravel().tolist()
         self._command(self._batch.commands, rows, actuated_mm)
         self._batch.move(rows)
-        return self._motion(self._batch.blocks[rows], actuated_mm)
+        return self._motion(self._batch.blocks[rows], actuated_mm, self._lines_mm[robots])
 
     def probe(self, actuated_mm: np.ndarray) -> FreeMotion:
         """Return the motion of all robots at other actuated coordinates ``(N, actions)`` [mm]; nothing moves."""
         commands = self._batch.commands.copy()
         self._command(commands, self._rows.ravel().tolist(), actuated_mm)
-        return self._motion(self._batch.probe(commands), actuated_mm)
+        return self._motion(self._batch.probe(commands), actuated_mm, self._lines_mm)
 
     def _steps(self, actuated_mm: np.ndarray) -> np.ndarray:
         """Return by how much the companions are pulled more, ``(k, commands)`` [mm]."""
@@ -118,10 +125,10 @@ class FreeRobots:
             places[:, 1 + k, k] += steps[:, k]
         self._adapter.write_command(commands, places.reshape(len(rows), -1), rows)
 
-    def _motion(self, rows: np.ndarray, actuated_mm: np.ndarray) -> FreeMotion:
+    def _motion(self, rows: np.ndarray, actuated_mm: np.ndarray, lines_mm: np.ndarray) -> FreeMotion:
         """Return the motion from blocks of robots and their companions, ``(k (1 + commands), size)``."""
         blocks, steps = rows.reshape(len(actuated_mm), -1, rows.shape[-1]), self._steps(actuated_mm)
-        layout, points = self._adapter.layout, self._adapter.points(blocks)
+        layout, points = self._adapter.layout, self._adapter.points(blocks, lines_mm)
         tips = layout.nodes(blocks)[..., -1, : points.shape[-1]]
         slopes = ((ends[:, 1:] - ends[:, :1]) / _beside(steps, ends) for ends in (points, tips))
         return FreeMotion(layout.tensions(blocks[:, 0]), *slopes)
@@ -151,13 +158,13 @@ class ForceEstimator:
         self._products, self._squares = np.ones(count), np.ones(count)
         self.chosen, self.paper = np.zeros(count), np.zeros(count)
 
-    def rest(self, robots: Sequence[int]) -> None:
-        """Begin new episodes of some robots."""
+    def rest(self, robots: Sequence[int], drawn: Sequence[Any]) -> None:
+        """Begin new episodes of some robots, which are those that are drawn; ``None`` for the nominal robot."""
         self.chosen[robots] = self.paper[robots] = 0.0
         prior = RigidityFit.prior()
         self._products[robots], self._squares[robots] = prior.products, prior.squares
         if self._free is not None:
-            self._free.rest(robots)
+            self._free.rest(robots, drawn)
 
     def get_rows(self, robots: list[int]) -> tuple[Arrays, Rows | None]:
         """Return what was learnt of some robots, and the robots that nothing touches."""

@@ -1,6 +1,6 @@
 """Randomised robots: every episode draws its own, so that one policy learns to control all of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -19,8 +19,9 @@ NOMINAL: Range = (1.0, 1.0)
 class Randomization:
     """Ranges of the robots around the nominal one, which every episode draws from.
 
-    Obstacles and set-points suit the robot that is drawn, in its natural units. Actions, the observation's scales, the
-    model of the estimator and the number of segments are the nominal robot's. Ratios are uniform in their logarithm.
+    Obstacles and set-points suit the robot that is drawn, in its natural units, and the estimator knows it, but for the
+    straight lines of ``paper``. Actions, the observation's scales and the number of segments are the nominal robot's.
+    Ratios are uniform in their logarithm.
 
     Attributes:
         rigidity: Flexural rigidity over the nominal one, of every segment.
@@ -47,17 +48,17 @@ class Randomization:
         """Return the robots at the ends of all ranges."""
         return (_resized(robot, *ratios) for ratios in product(self.rigidity, self.length, self.offset))
 
-    def sample(self, robot: Any, tendon_loss: float, generator: np.random.Generator) -> "Drawn":
-        """Return a robot from the ranges around a nominal one, whose cables have this friction."""
+    def sample(self, robot: Any, generator: np.random.Generator) -> "Drawn":
+        """Return a robot from the ranges around a nominal one."""
         low, high = self._ends()
         ratios = np.exp(low + generator.random(len(low)) * (high - low)).tolist()
-        return Drawn(_resized(robot, *ratios), (*ratios, tendon_loss))
+        return Drawn(_resized(robot, *ratios), ratios)
 
     def features(self, numbers: np.ndarray, losses: Range) -> np.ndarray:
         """Return where robots are in their ranges, from −1 to 1, ``(..., 4)``; 0 where a range is a single number.
 
         Args:
-            numbers: Those of :class:`Drawn`, ``(..., 4)``.
+            numbers: Rigidity, length and offset over the nominal ones, and the share of friction, ``(..., 4)``.
             losses: Range of the share of friction.
         """
         low, high = (np.append(end, loss) for end, loss in zip(self._ends(), losses, strict=True))
@@ -76,11 +77,11 @@ class Drawn(NamedTuple):
 
     Attributes:
         robot: The robot; ``None`` for the nominal one.
-        numbers: Rigidity, length and offset over the nominal ones, and the share of the tension that is lost.
+        ratios: Its rigidity, length and offset over the nominal ones.
     """
 
     robot: Any = None
-    numbers: tuple[float, ...] = (1.0, 1.0, 1.0, 0.0)
+    ratios: Sequence[float] = (1.0, 1.0, 1.0)
 
 
 def _resized(robot: Any, rigidity: float, length: float, offset: float) -> Any:

@@ -138,7 +138,7 @@ class Trials:
         batch, adapter, estimator = self._batch, self._adapter, self._estimator
         assert estimator is not None
         batch.rest(robots)
-        estimator.rest(robots)
+        estimator.rest(robots, [batch.robot_of(robot) for robot in robots])
         rows, pulled, lengths = np.array(robots), 0.0, adapter.layout.length(batch.blocks[robots])
         found, reached = np.zeros(len(rows), bool), np.zeros((len(rows), adapter.space))
         going = np.ones(len(rows), bool)

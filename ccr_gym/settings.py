@@ -88,8 +88,8 @@ class BaseSettings(Generic[RobotT]):
         weights: Weights of the reward terms, or a mapping of names to weights.
         backend: ``"native"``, or ``"casadi"`` for the reference solver, which is slow.
         sensing: ``"ideal"``, ``"realistic"``, or a :class:`ccr_gym.Sensing` or mapping of its fields.
-        randomize: A :class:`ccr_gym.Randomization` or mapping of its fields: every episode draws its own robot, and the
-            estimator learns its rigidity; ``None`` for the same robot in all.
+        randomize: A :class:`ccr_gym.Randomization` or mapping of its fields: every episode draws its own robot;
+            ``None`` for the same robot in all.
         split: Scenes to sample: ``"train"``, ``"test"``, or ``"all"``; training and test scenes are disjoint.
 
     Raises:
@@ -148,14 +148,11 @@ class BaseSettings(Generic[RobotT]):
 
     @property
     def sensors(self) -> Sensing | None:
-        """Ranges of the imperfections, or ``None`` where sensing is ideal and the robot known."""
+        """Ranges of the imperfections, or ``None`` where sensing is ideal."""
         given = Sensing() if self.sensing == "realistic" else self.sensing
         ranges = given if isinstance(given, Sensing) else None
-        if self.randomize is None:
-            return ranges
-        loss = self.randomize.tendon_loss
-        ranges = ranges or EXACT
-        return ranges if loss is None else replace(ranges, tendon_loss=loss)
+        loss = None if self.randomize is None else self.randomize.tendon_loss
+        return ranges if loss is None else replace(ranges or EXACT, tendon_loss=loss)
 
     @property
     def reach_mm(self) -> float:

@@ -139,12 +139,14 @@ class Transition:
     def _sample_hidden(self, generator: np.random.Generator) -> tuple[Imperfections | None, Drawn]:
         """Return imperfections and robot of an episode, sampled aside so that scenes are the same whatever they are."""
         settings, seed = self._settings, int(generator.integers(SEEDS))
-        if settings.sensors is None:
+        if settings.sensors is None and settings.randomize is None:
             return None, Drawn()
-        aside = np.random.default_rng(seed)
-        sampled = sample_imperfections(settings.sensors, settings.scales, self.adapter.space, aside)
-        ranges = settings.randomize
-        return sampled, Drawn() if ranges is None else ranges.sample(settings.robot, sampled.tendon_loss, aside)
+        aside, sampled, drawn = np.random.default_rng(seed), None, Drawn()
+        if settings.randomize is not None:
+            drawn = settings.randomize.sample(settings.robot, aside)
+        if settings.sensors is not None:
+            sampled = sample_imperfections(settings.sensors, settings.scales, self.adapter.space, aside)
+        return sampled, drawn
 
     def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
         """Start a given episode of a robot; its generator samples the imperfections.
@@ -176,12 +178,11 @@ class Transition:
             self._goal_n[robots] = forces
             self._desired_n[robots] = norm(forces)
         self.batch.rest(robots)
-        self._estimator.rest(robots)
+        self._estimator.rest(robots, [own.robot for own in drawn])
         self._last_actions[robots], self._time[robots] = 0.0, 0
         self._actuated_mm[robots] = self.adapter.actuated_mm(self.batch.blocks[robots], self._actuated_mm[robots] * 0.0)
-        if (ranges := self._settings.randomize) is not None and self._settings.sensors is not None:
-            self._drawn[robots] = [own.numbers for own in drawn]
-            self._robot_features[robots] = ranges.features(self._drawn[robots], self._settings.sensors.tendon_loss)
+        if self._settings.randomize is not None:
+            self._note_drawn(robots, imperfections, drawn)
         for robot, assignment, sampled in zip(robots, assignments, imperfections, strict=True):
             self._starts[robot] = assignment.scene
             if self._motions_mm is not None:
@@ -192,6 +193,17 @@ class Transition:
                 self._sensors.begin_episode(robot, sampled, self._actuated_mm[robot])
             if self.adapter.obstacle_size:
                 self._obstacle_features[robot] = self.adapter.obstacle_features(assignment.scene)
+
+    def _note_drawn(
+        self, robots: Sequence[int], imperfections: Sequence[Imperfections | None], drawn: Sequence[Drawn]
+    ) -> None:
+        """Note what robots are, for observation and info."""
+        ranges, sensing = self._settings.randomize, self._settings.sensors
+        assert ranges is not None
+        losses = [0.0 if sampled is None else sampled.tendon_loss for sampled in imperfections]
+        self._drawn[robots] = [(*own.ratios, loss) for own, loss in zip(drawn, losses, strict=True)]
+        loss_range = (0.0, 0.0) if sensing is None else sensing.tendon_loss
+        self._robot_features[robots] = ranges.features(self._drawn[robots], loss_range)
 
     def step(self, actions: np.ndarray, index: EnvIndex = ALL) -> None:
         """Move the actuated coordinates of some robots by increments.

@@ -112,6 +112,18 @@ def test_a_ranges_of_one_is_the_nominal_robot(env_id):
         assert info is None or info["robot"].tolist() == [1, 1, 1, 0]
 
 
+@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/SpatialPush-v1"])
+def test_the_estimator_knows_the_drawn_robot(env_id):
+    envs = gymnasium.make_vec(env_id, 32, randomize=RANGES | {"tendon_loss": None})
+    envs.reset(seed=0)
+    ratios, least = [], 0.05 * envs.unwrapped.settings.scales.force_n
+    for _ in range(60):
+        info = envs.step(np.full(envs.action_space.shape, 0.5, np.float32))[4]
+        true, estimate = (np.linalg.norm(info[key], axis=1) for key in ("force_true", "force_est"))
+        ratios.extend((estimate / np.maximum(true, least))[true > least])
+    assert 0.9 < np.median(ratios) < 1.05  # 0.82 and 0.88 with the nominal robot's motion
+
+
 def test_states_keep_the_robot():
     env = make(sensing="realistic")
     env.reset(seed=3)
