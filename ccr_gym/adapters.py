@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from ccr_gym.actions import ActionSpec
+from ccr_gym.checks import require
 from ccr_gym.quantities import EnvIndex, Quantity, as_scalar
 from ccr_gym.scales import RADIUS_SPAN
 from ccr_gym.settings import AnySettings, InsertionSettings, Settings, SpatialSettings
@@ -148,7 +149,14 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         return {"cable_mm": cables.copy(), "tension": tensions.copy()}
 
     def _action_spec(self) -> ActionSpec:
-        """Return the actuated coordinates."""
+        """Return the actuated coordinates.
+
+        Raises:
+            ValueError: If there is a section that its cables cannot bend to where obstacles are.
+        """
+        least, where = (0.0, "+x") if self.space == 2 else (self.actuation.low, "x and y")
+        bent = bool((self.actuation.high > least).all())
+        require(bent, f"the cables of the robot cannot bend every section towards {where}; give it cables that do")
         limit, increment = self.settings.cable_limit_mm, self.settings.max_increment_mm
         low, high = limit * self.actuation.low, limit * self.actuation.high
         return ActionSpec(low.size, low, high, np.full(low.size, increment))

@@ -305,8 +305,9 @@ class Transition:
         """Put robots into states of :meth:`get_rows`, from which they go on with the same bits.
 
         Raises:
-            ValueError: If they are states of other robots.
+            ValueError: If they are states of other robots, or of an environment of another kind.
         """
+        self._check_alike(state)
         scenes = {len(scene) for scene in state.rows.scenes if scene is not None}
         self._use(self._pipeline_for(scenes.pop() if scenes else self._task.obstacles))
         self.batch.set_rows(robots, state.rows)
@@ -316,6 +317,12 @@ class Transition:
             self._starts[robot] = start
         if self._sensors is not None:
             self._sensors.set_rows(robots, state.sensors)
+
+    def _check_alike(self, state: EpisodeState) -> None:
+        """Raise an error for a state that lacks a part that these episodes have, or has one that they lack."""
+        own = self._motions_mm is not None, self._profiles is not None, self._sensors is not None
+        given = "_motions_mm" in state.episode, "_profiles" in state.episode, bool(state.sensors)
+        require(own == given, "the state is of another task or sensing; take it from an environment of equal arguments")
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:
         """Return a robot's present equilibrium; it is immutable."""

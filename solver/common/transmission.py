@@ -8,6 +8,7 @@ import numpy as np
 from solver.common.validation import LARGEST, check_array, check_number, check_whole
 
 MOST_LOSS = 0.9
+ROUNDING = 1e-12  # of a displacement; a stalled cable that is let rest comes out of a step a last bit away
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +46,7 @@ class Transmission:
         return cls(losses, np.ones((*losses.shape, check_whole("cables", cables, 1, 4096)), bool))
 
     def moved(self, before_mm: np.ndarray, after_mm: np.ndarray) -> Self:
-        """Return the state after cables have moved in the robot; one that has not moved keeps its direction.
+        """Return the state after cables have moved in the robot; one that rests, but for rounding, keeps its direction.
 
         Args:
             before_mm: Displacements of the cables, as ``Equilibrium.cables_mm``, ``(..., c)`` [mm].
@@ -54,8 +55,9 @@ class Transmission:
         Raises:
             ValueError: If they are not displacements of these cables.
         """
-        increment = self._checked("after_mm", after_mm) - self._checked("before_mm", before_mm)
-        return replace(self, moved_in=np.where(increment == 0, self.moved_in, increment > 0))
+        after, before = self._checked("after_mm", after_mm), self._checked("before_mm", before_mm)
+        resting = np.abs(after - before) <= ROUNDING * np.abs(before)
+        return replace(self, moved_in=np.where(resting, self.moved_in, after > before))
 
     def motor_tensions(self, robot_tensions: np.ndarray) -> np.ndarray:
         """Return the tensions at the motors for those in the robot, ``(..., c)`` [N].

@@ -145,6 +145,22 @@ def test_other_states_are_refused_and_change_nothing(state, error, message):
     assert np.array_equal(env.step(np.zeros(1, np.float32))[0], before)
 
 
+@pytest.mark.parametrize("env_id", ["CCR/MovingObstacle-v1", "CCR/TrackForce-v1"])
+@pytest.mark.parametrize("sensing", ["ideal", "realistic"])
+def test_states_of_another_kind_are_refused_and_change_nothing(env_id, sensing):
+    env, others = make("CCR/PushObstacle-v1"), [make(env_id, sensing=sensing)]
+    if sensing == "realistic":
+        others.append(make("CCR/PushObstacle-v1", sensing=sensing))
+    env.reset(seed=0)
+    before = env.step(np.ones(1, np.float32))[0]
+    for other in others:
+        other.reset(seed=1)
+        for one, two in ((env, other), (other, env)):
+            with pytest.raises(ValueError, match="another task or sensing"):
+                one.set_state(two.get_state())
+    assert np.array_equal(env.step(np.zeros(1, np.float32))[0], before)
+
+
 @pytest.mark.parametrize("indices", [[0, 1], [0, 1, 2, 4], [-1, 0, 0, 0], [0.5, 0, 0, 0], None])
 def test_forks_of_no_environment_are_refused(indices):
     env = make_vec("CCR/PushObstacle-v1")

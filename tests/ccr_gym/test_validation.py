@@ -1,5 +1,6 @@
 """Validation of the arguments of environments: messages name argument, value and bound."""
 
+import math
 import os
 from dataclasses import fields
 
@@ -9,6 +10,7 @@ import pytest
 
 import ccr_gym
 from ccr_gym import RewardWeights, Sensing
+from solver import Cable
 
 PUSH = "CCR/PushObstacle-v1"
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
@@ -116,6 +118,22 @@ def test_invalid_settings_are_refused(kwargs, message):
     for build in (make, make_vec):
         with pytest.raises(ValueError, match=message):
             build(**kwargs)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "cables", "where"),
+    [
+        (PUSH, (Cable(angle=math.pi),), r"towards \+x"),
+        (PUSH, (Cable(end=9), Cable(angle=math.pi)), r"towards \+x"),
+        ("CCR/SpatialPush-v1", (Cable(),), "towards x and y"),
+        ("CCR/SpatialPush-v1", (Cable(), Cable(angle=math.pi)), "towards x and y"),
+    ],
+)
+def test_robots_that_cannot_bend_to_the_obstacles_are_refused(env_id, cables, where):
+    robot = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0, "cables": cables}
+    for build in (make, make_vec):
+        with pytest.raises(ValueError, match=f"cannot bend every section {where}; give it cables that do"):
+            build(env_id, robot=robot)
 
 
 @pytest.mark.parametrize(

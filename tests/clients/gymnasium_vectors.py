@@ -24,7 +24,9 @@ WRAPPERS = {
     "ClipReward": lambda envs: vector.ClipReward(envs, -1, 1),
     "DictInfoToList": vector.DictInfoToList,
     "NumpyToTorch": vector.NumpyToTorch,
-    "RecordVideo": lambda envs: vector.RecordVideo(envs, "vectors", episode_trigger=lambda _: True),
+    "RecordVideo": lambda envs: vector.RecordVideo(
+        envs, f"videos/{type(envs).__name__}", episode_trigger=lambda _: True
+    ),
 }
 
 
@@ -57,5 +59,5 @@ if __name__ == "__main__":
                 envs.close()
             except BaseException as error:
                 raise RuntimeError(f"{name} of {IDS[-1]}, {mode}: {error!r}") from error
-    assert list(Path("vectors").glob("*.mp4"))
+    assert len({film.parent for film in Path().glob("videos/*/*.mp4")}) == 2
     print(f"Gymnasium {gymnasium.__version__}: {', '.join(MODES)} bit-identical, {len(WRAPPERS)} vector wrappers")

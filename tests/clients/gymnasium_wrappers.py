@@ -32,7 +32,7 @@ WRAPPERS = {
     "AddRenderObservation": lambda env: wrappers.AddRenderObservation(env, render_only=False),
     "AddWhiteNoise": lambda env: wrappers.AddWhiteNoise(env, 0.5),
     "NumpyToTorch": wrappers.NumpyToTorch,
-    "RecordVideo": lambda env: wrappers.RecordVideo(env, "videos", episode_trigger=lambda _: True),
+    "RecordVideo": lambda env: wrappers.RecordVideo(env, f"videos/{env.spec.name}", episode_trigger=lambda _: True),
 }
 
 
@@ -57,5 +57,5 @@ for env_id in ("CCR/PushObstacle-v1", "CCR/SpatialPush-v1"):
             episode(env_id, wrapper)
         except BaseException as error:
             raise RuntimeError(f"{name} of {env_id}: {error!r}") from error
-assert list(Path("videos").glob("*.mp4"))
+assert len({film.parent for film in Path().glob("videos/*/*.mp4")}) == 2
 print(f"Gymnasium {gymnasium.__version__}: check_env of {len(ccr_gym.ENV_IDS)} ids, {len(WRAPPERS)} wrappers")

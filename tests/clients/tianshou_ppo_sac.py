@@ -13,7 +13,7 @@ SIZES = {"max_epochs": 1, "epoch_num_steps": 256, "num_training_envs": 2, "num_t
 
 
 def train(builder, training, env_id: str, kind: VectorEnvType) -> float:
-    envs = EnvFactoryRegistered(task=env_id, training_seed=0, test_seed=1, venv_type=kind)
+    envs = EnvFactoryRegistered(task=env_id, venv_type=kind)
     quiet = ExperimentConfig(persistence_enabled=False, watch=False, device="cpu")
     return builder(envs, quiet, training).build().run().trainer_result.best_reward
 

@@ -43,7 +43,10 @@ def test_a_cable_that_stands_still_keeps_its_direction():
     assert state.moved([0.0], [0.0]).moved_in.all()
     released = state.moved([1.0], [0.9])
     assert not released.moved([0.9], [0.9]).moved_in.any()
-    assert released.moved([0.9], [0.9 + 1e-15]).moved_in.all()
+    assert released.moved([0.9], [0.9 + 1e-11]).moved_in.all()
+    assert not released.moved([0.9], [0.9 + 1e-15]).moved_in.any()
+    assert not released.moved([0.0], [0.0]).moved_in.any()
+    assert released.moved([0.0], [1e-15]).moved_in.all()
 
 
 def test_cables_and_robots_have_directions_of_their_own():
