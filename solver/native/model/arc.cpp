@@ -1,3 +1,5 @@
+#include <algorithm>
+
 // Two lanes here: without AVX2 a register holds no more, and twice as many lanes spill.
 #define CCR_SIMD narrow
 #define CCR_LANES 2
@@ -18,11 +20,31 @@ const bool has_avx2 = __builtin_cpu_supports("avx2");
 }
 #endif
 
-void ArcLaw::bend(int n, double length, const Rows& controls, Arc* arcs, Rows& shared) {
+namespace {
+
+void bend_each(int n, double length, const Rows& controls, Arc* arcs, Rows& shared) {
 #ifdef CCR_AVX2
   if (has_avx2) return broad::bend_arcs(n, length, controls, arcs, shared);
 #endif
   narrow::bend_arcs(n, length, controls, arcs, shared);
+}
+
+// Whether all of n segments have the same controls.
+bool are_alike(int n, const Rows& controls) {
+  for (int k = 0; k < ArcLaw::kControl; ++k) {
+    const double* row = controls.row(k);
+    if (!std::all_of(row, row + n, [&](double control) { return control == row[0]; })) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void ArcLaw::bend(int n, double length, const Rows& controls, Arc* arcs, Rows& shared) {
+  if (n == 1 || !are_alike(n, controls)) return bend_each(n, length, controls, arcs, shared);
+  bend_each(1, length, controls, arcs, shared);
+  std::fill_n(arcs + 1, n - 1, Arc(arcs[0]));
+  for (int k = 0; k < kShared; ++k) std::fill_n(shared.row(k), n, double(shared.row(k)[0]));
 }
 
 void ArcLaw::measure(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared) {

@@ -195,10 +195,6 @@ class ContactProblem {
   void place_obstacles(double part);
   // Those of a shape are placed where they are looked at: most are out of reach of all obstacles.
   void place_all() const;
-  void place(int node, const Vec<2>& line, Position& point) const {
-    point = nodes_[node];
-    point += Model::lever(frames()[node], line);
-  }
   void measure_slacks_and_disks(const Command& command) requires(Model::kRod);
   void push_disks(const ActiveSet& active) requires(Model::kRod);
   int disk_segment(int contact) const { return (contact - first_disk_contact()) / Model::kDiskSides; }
