@@ -29,6 +29,13 @@ void bend_each(int n, double length, const Rows& controls, Arc* arcs, Rows& shar
   narrow::bend_arcs(n, length, controls, arcs, shared);
 }
 
+void measure_each(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared) {
+#ifdef CCR_AVX2
+  if (has_avx2) return broad::measure_cables(cables, controls, shared);
+#endif
+  narrow::measure_cables(cables, controls, shared);
+}
+
 // Whether all of n segments have the same controls.
 bool are_alike(int n, const Rows& controls) {
   for (int k = 0; k < ArcLaw::kControl; ++k) {
@@ -40,18 +47,23 @@ bool are_alike(int n, const Rows& controls) {
 
 }  // namespace
 
-void ArcLaw::bend(int n, double length, const Rows& controls, Arc* arcs, Rows& shared) {
-  if (n == 1 || !are_alike(n, controls)) return bend_each(n, length, controls, arcs, shared);
-  bend_each(1, length, controls, arcs, shared);
+bool ArcLaw::bend(int n, double length, const Rows& controls, Arc* arcs, Rows& shared) {
+  const bool alike = n > 1 && are_alike(n, controls);
+  bend_each(alike ? 1 : n, length, controls, arcs, shared);
+  if (!alike) return false;
   std::fill_n(arcs + 1, n - 1, Arc(arcs[0]));
   for (int k = 0; k < kShared; ++k) std::fill_n(shared.row(k), n, double(shared.row(k)[0]));
+  return true;
 }
 
-void ArcLaw::measure(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared) {
-#ifdef CCR_AVX2
-  if (has_avx2) return broad::measure_cables(cables, controls, shared);
-#endif
-  narrow::measure_cables(cables, controls, shared);
+void ArcLaw::measure(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared, bool alike) {
+  if (!alike) return measure_each(cables, controls, shared);
+  for (const auto& [hole, end, distances, slopes] : cables) {
+    const ArcCable first{{hole[0], hole[1], hole[2]}, 1, distances, slopes};
+    measure_each({&first, 1}, controls, shared);
+    std::fill_n(distances, end, double(distances[0]));
+    std::fill_n(slopes, end, Vec<3>(slopes[0]));
+  }
 }
 
 void ArcLaw::hessian_contraction(int n, const Rows& controls, const Rows& shared, const Rows& adjoints,

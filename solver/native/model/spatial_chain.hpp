@@ -44,9 +44,9 @@ inline constexpr Mat<3, 3> kBaseFrame = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
 
 // Point on a disk, from its center, at a place in its frame.
 inline Vec<3> disk_lever(const Mat<3, 3>& frame, const Vec<2>& place) {
-  Vec<3> lever;
-  for (int k = 0; k < 3; ++k) lever[k] = frame(k, 0) * place[0] + frame(k, 1) * place[1];
-  return lever;
+  const Pack<2> across{{frame(0, 0), frame(1, 0)}}, along{{frame(0, 1), frame(1, 1)}};
+  const Pack<2> level = across * place[0] + along * place[1];
+  return {{level.v[0], level.v[1], frame(2, 0) * place[0] + frame(2, 1) * place[1]}};
 }
 
 // Finds state and frame of the upper disk of a segment. Returns its chord in the base frame.

@@ -49,10 +49,10 @@ bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& co
   length_ = command.length / n;
   for (int k = 0; k < kControl; ++k)
     for (int i = 0; i < n; ++i) controls_.row(k)[i] = controls[i][k];
-  ArcLaw::bend(n, length_, controls_, arcs_.data(), shared_);
+  const bool alike = ArcLaw::bend(n, length_, controls_, arcs_.data(), shared_);
   for (int i = 0; i < n; ++i) chords_[i] = move_up(arcs_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
   add_strain(controls);
-  take_up_cables();
+  take_up_cables(alike);
   return std::isfinite(objective) && widest <= tolerances::kWidestTurn;
 }
 
@@ -73,12 +73,14 @@ void SpatialRod::add_strain(const std::vector<Control>& controls) {
   widest = std::sqrt(square);
 }
 
-void SpatialRod::take_up_cables() {
-  ArcLaw::measure(arc_cables_, controls_, shared_);
+void SpatialRod::take_up_cables(bool alike) {
+  ArcLaw::measure(arc_cables_, controls_, shared_, alike);
   cables_.clear();
   for (int k = 0; k < cables_.count(); ++k) {
+    const auto& [hole, end, distances, slopes] = arc_cables_[k];
     double taken = 0;
-    for (int i = 0; i < arc_cables_[k].end; ++i) taken += length_ - arc_cables_[k].distances[i];
+#pragma GCC unroll 4
+    for (int i = 0; i < end; ++i) taken += length_ - distances[i];
     cables_.set_taken(k, taken);
   }
 }

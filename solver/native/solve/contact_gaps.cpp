@@ -12,9 +12,11 @@ namespace ccr {
 template <class Model>
 void place_node(const Robot& robot, const Position<Model::kSpace>& node, const typename Model::Frame& frame,
                 Position<Model::kSpace>* point) {
+  const auto at = node;  // copies that no point written may change
+  const auto turned = frame;
   for (const Vec<2>& line : robot.lines) {
-    Position<Model::kSpace> placed = node;
-    placed += Model::lever(frame, line);
+    Position<Model::kSpace> placed = at;
+    placed += Model::lever(turned, line);
     *point = placed;
     point += robot.positions();
   }
@@ -46,6 +48,7 @@ template <class Model>
 void ContactProblem<Model>::update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts) {
   std::copy(nodes.begin(), nodes.end(), origin_.begin());
   mount_origin_ = mounts;
+  evaluated_ = false;
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
     clear_[j] = clearance(obstacles_[j], nodes) - reach_;
     if (mount_of_[j] >= 0) clear_[j] -= norm(mounts[mount_of_[j]]);

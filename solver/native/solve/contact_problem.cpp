@@ -28,6 +28,7 @@ template <class Model>
 void ContactProblem<Model>::set_robot(const Robot& robot) {
   robot_ = robot;
   model_.set_robot(robot);
+  evaluated_ = false;
   const int stride = robot.between + 1;
   sites_.clear();
   farthest_line_ = 0;
@@ -43,6 +44,7 @@ void ContactProblem<Model>::set_robot(const Robot& robot) {
 template <class Model>
 void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
   obstacles_ = obstacles;
+  evaluated_ = false;
   motions_ = {};
   largest_motion_ = 0;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
@@ -56,7 +58,16 @@ void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
 }
 
 template <class Model>
+bool ContactProblem<Model>::is_evaluated(const Iterate& at) const {
+  const auto same = [](const auto& a, const auto& b) { return a.v == b.v; };
+  return evaluated_ && std::equal(controls_.begin(), controls_.end(), at.controls.begin(), same) &&
+         command_ == at.command && std::equal(displacements_.begin(), displacements_.end(), at.mounts.begin(), same);
+}
+
+template <class Model>
 bool ContactProblem<Model>::evaluate(const Iterate& at) {
+  if (is_evaluated(at)) return true;
+  evaluated_ = has_gradient_ = false;
   if (!model_.evaluate(at.command, at.controls)) return false;
   loaded_ = at.command.loads;
   if (is_moving()) place_obstacles(at.command.scene);
@@ -69,6 +80,9 @@ bool ContactProblem<Model>::evaluate(const Iterate& at) {
   all_placed_ = false;
   measure_gaps();
   if constexpr (Model::kRod) measure_slacks_and_disks(at.command);
+  command_ = at.command;
+  controls_ = at.controls;
+  evaluated_ = true;
   return true;
 }
 
@@ -209,6 +223,9 @@ double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) co
 
 template <class Model>
 void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
+  if (has_gradient_ && pressed_ == active) return;
+  has_gradient_ = true;
+  pressed_ = active;
   std::fill(node_forces_.begin(), node_forces_.end(), State{});
   Vec<Model::kCables> slack_multipliers{};
   if constexpr (Model::kRod) add_loads(node_forces_);
