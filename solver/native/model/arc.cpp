@@ -51,8 +51,8 @@ bool ArcLaw::bend(int n, double length, const Rows& controls, Arc* arcs, Rows& s
   const bool alike = n > 1 && are_alike(n, controls);
   bend_each(alike ? 1 : n, length, controls, arcs, shared);
   if (!alike) return false;
-  std::fill_n(arcs + 1, n - 1, Arc(arcs[0]));
-  for (int k = 0; k < kShared; ++k) std::fill_n(shared.row(k), n, double(shared.row(k)[0]));
+  std::fill_n(arcs + 1, n - 1, arcs[0]);
+  for (int k = 0; k < kShared; ++k) std::fill_n(shared.row(k) + 1, n - 1, shared.row(k)[0]);
   return true;
 }
 
@@ -61,8 +61,8 @@ void ArcLaw::measure(std::span<const ArcCable> cables, const Rows& controls, con
   for (const auto& [hole, end, distances, slopes] : cables) {
     const ArcCable first{{hole[0], hole[1], hole[2]}, 1, distances, slopes};
     measure_each({&first, 1}, controls, shared);
-    std::fill_n(distances, end, double(distances[0]));
-    std::fill_n(slopes, end, Vec<3>(slopes[0]));
+    std::fill_n(distances + 1, end - 1, distances[0]);
+    std::fill_n(slopes + 1, end - 1, slopes[0]);
   }
 }
 

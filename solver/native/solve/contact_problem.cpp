@@ -12,6 +12,7 @@ template <class Model>
 ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
     : robot_(robot),
       model_(robot),
+      controls_(robot.segments),
       origin_(robot.segments + 1),
       clear_(obstacles),
       nodes_(robot.segments + 1),
@@ -55,13 +56,6 @@ void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
   mount_origin_.resize(mounts);
   displacements_.resize(mounts);
   mount_gradient_.resize(mounts);
-}
-
-template <class Model>
-bool ContactProblem<Model>::is_evaluated(const Iterate& at) const {
-  const auto same = [](const auto& a, const auto& b) { return a.v == b.v; };
-  return evaluated_ && std::equal(controls_.begin(), controls_.end(), at.controls.begin(), same) &&
-         command_ == at.command && std::equal(displacements_.begin(), displacements_.end(), at.mounts.begin(), same);
 }
 
 template <class Model>

@@ -178,7 +178,12 @@ class ContactProblem {
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
  private:
-  bool is_evaluated(const Iterate& at) const;
+  bool is_evaluated(const Iterate& at) const {
+    const auto same = [](const auto& a, const auto& b) { return a.v == b.v; };
+    return evaluated_ && std::equal(controls_.begin(), controls_.end(), at.controls.begin(), same) &&
+           command_ == at.command && std::equal(displacements_.begin(), displacements_.end(), at.mounts.begin(), same);
+  }
+
   // Location of a point: a fraction of the way from a node to the next, on a line across the disks.
   struct Site {
     int node;
