@@ -33,12 +33,19 @@ def planar(model: str) -> list[PlanarStep]:
     return list(contact_mix(STEPS, robot=replace(Robot.prototype(), model=model)))
 
 
+def in_space(cables: int) -> list[space.SpatialStep]:
+    """Return the contact mix in space with the rod and a number of even cables."""
+    return list(space.contact_mix(STEPS, robot=space.rod(cables)))
+
+
 Steps = Sequence[PlanarStep | space.SpatialStep]
 MIXES: dict[str, Callable[[], Steps]] = {
     "paper": lambda: planar("paper"),
     "rod": lambda: planar("rod"),
     "space": lambda: list(space.contact_mix(STEPS)),
-    "space rod": lambda: list(space.contact_mix(STEPS, robot=space.rod(4))),
+    "space rod, 2 cables": lambda: in_space(2),
+    "space rod, 3 cables": lambda: in_space(3),
+    "space rod": lambda: in_space(4),
 }
 
 
@@ -54,7 +61,7 @@ def write(steps: Steps, path: Path) -> None:
         parts.append(len(solver.scene))
         for obstacle in solver.scene:
             parts += [SHAPES[obstacle.kind].value, len(obstacle.parameters), obstacle.parameters]
-        parts.append(len(group))
+        parts += [len(group[0].start.block), len(group)]
         for step in group:
             parts += [step.command, step.start.length_mm, step.start.block]
     np.concatenate([np.ravel(part) for part in parts]).astype(np.float64).tofile(path)

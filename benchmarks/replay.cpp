@@ -51,6 +51,7 @@ int replay(Recording& recording) {
     const auto continuation = ccr::make_continuation<D>(robot, static_cast<int>(obstacles.size()));
     continuation->set_obstacles(obstacles);
     std::vector<double> to(continuation->layout().size);
+    if (recording.count() != static_cast<int>(to.size())) std::exit(3);  // recorded of another robot
     for (int left = recording.count(); left > 0; --left, ++steps) {
       const std::vector<double> command = recording.numbers(continuation->layout().cables.size + 1),
                                 from = recording.numbers(to.size());

@@ -85,7 +85,7 @@ inline constexpr double kSweepStride = 0.28;  // path that cannot cut so deep, o
 inline constexpr int kSweepStrides = 256;     // along one path before it counts as obstructed
 inline constexpr int kEdgeHalvings = 7;       // bisections for the deepest point of an edge
 
-inline constexpr int kOnsetBisections = 20;  // bisections for where a contact began
+inline constexpr int kOnsetParts = 1 << 20;  // of the way, to one of which it is known where a contact began
 
 // Stall: a cable stops where its tension is within the fraction kTensionBand below the limit.
 inline constexpr double kTensionBand = 1e-6;

@@ -45,7 +45,8 @@ inline double longest_edge(const RobotNumbers& of, const Vec<2>& line) {
 // An even rod with cables to its tip.
 inline Rod make_rod(const RobotNumbers& of) {
   const std::size_t numbers = 3 * static_cast<std::size_t>(of.segments);  // in the plane a third of them serves
-  Rod rod{.cables = {}, .stiffness = std::vector<double>(numbers, 1), .rest = std::vector<double>(numbers, 0)};
+  Rod rod{
+      .cables = {}, .stiffness = std::vector<double>(numbers, 1), .rest = std::vector<double>(numbers, 0), .loads = {}};
   for (const double angle : of.cables)
     rod.cables.push_back({{{of.offset * std::cos(angle), of.offset * std::sin(angle)}}, of.segments});
   rod.least_pull = of.cables.size() == 1 ? 0 : -kInfinity;
@@ -71,12 +72,18 @@ inline Robot make_robot(const RobotNumbers& of, std::vector<Vec<2>> lines) {
           .rod = of.rod ? make_rod(of) : Rod{}};
 }
 
-// Lines on backbone and cable in the plane; in space on the backbone, through both holes, and opposite them.
+// Lines on backbone and cable in the plane; in space on the backbone and through the holes of the cables, in the
+// paper's model of both and opposite them.
 template <int D>
 Robot make_robot(const RobotNumbers& of) {
   const double a = of.offset, x = a * std::cos(of.angle), y = a * std::sin(of.angle);
   if (D == 2) return make_robot(of, {{{0, 0}}, {{a, 0}}});
-  Robot robot = make_robot(of, {{{0, 0}}, {{a, 0}}, {{x, y}}, {{-a, 0}}, {{-x, -y}}});
+  std::vector<Vec<2>> lines{{{0, 0}}, {{a, 0}}, {{x, y}}, {{-a, 0}}, {{-x, -y}}};
+  if (of.rod) {
+    lines.resize(1);
+    for (const double angle : of.cables) lines.push_back({{a * std::cos(angle), a * std::sin(angle)}});
+  }
+  Robot robot = make_robot(of, std::move(lines));
   robot.model = of.rod ? ModelKind::kSpatialRod : ModelKind::kSpatialPaper;
   for (std::size_t k = 2; k < robot.rod.stiffness.size(); k += 3) robot.rod.stiffness[k] = 0.77;  // GJ over EI
   return robot;

@@ -144,8 +144,6 @@ TEST_CASE("the slopes of a segment of the rod in space are those of its shape") 
     }
 }
 
-#ifdef CCR_AVX2
-
 // A robot with random segments, and two cables of which one ends before its tip.
 struct Chain {
   explicit Chain(int n)
@@ -179,6 +177,26 @@ struct Chain {
 };
 
 bool same_bytes(const void* a, const void* b, std::size_t bytes) { return std::memcmp(a, b, bytes) == 0; }
+
+TEST_CASE("a robot that bends evenly is that of its segments each by itself") {
+  const Vec<3> control = {{0.3, -0.2, 0.1}};
+  const Segment one(control, 1);
+  for (const int n : {1, 2, 5, 18}) {
+    Chain all(n), each(n);
+    for (Chain* chain : {&all, &each}) {
+      for (int i = 0; i < n; ++i) chain->controls.put(i, control.v.data(), 3);
+      CHECK(ArcLaw::bend(n, one.length, chain->controls, chain->arcs.data(), chain->shared) == (n > 1));
+      ArcLaw::measure(chain->cables, chain->controls, chain->shared, chain == &all);
+    }
+    for (int i = 0; i < n; ++i) CHECK(same_bytes(&all.arcs[i], &one.at(), sizeof(Arc)));
+    for (int k = 0; k < ArcLaw::kShared; ++k) CHECK(all.shared.at(k, n - 1) == one.shared.at(k, 0));
+    CHECK(same_bytes(all.slopes.data(), each.slopes.data(), all.slopes.size() * sizeof(Vec<3>)));
+    for (const int k : {0, 1})
+      CHECK(same_bytes(all.cables[k].distances, each.cables[k].distances, all.cables[k].end * sizeof(double)));
+  }
+}
+
+#ifdef CCR_AVX2
 
 TEST_CASE("AVX2 gives the same bits for the rod in space" * doctest::skip(!__builtin_cpu_supports("avx2"))) {
   for (int n = 1; n < 40; ++n) {

@@ -40,6 +40,24 @@ template <int R, int K, int C, class T>
   return out;
 }
 
+// The same, of two numbers in a row and of the third.
+inline Mat<3, 3> times(const Mat<3, 3>& a, const Mat<3, 3>& b) {
+  Mat<3, 3> out;
+  Pack<2> two[3];
+  for (int k = 0; k < 3; ++k) std::memcpy(&two[k].v, &b(k, 0), sizeof two[k].v);
+  for (int r = 0; r < 3; ++r) {
+    Pack<2> sum = a(r, 0) * two[0];
+    double last = a(r, 0) * b(0, 2);
+    for (int k = 1; k < 3; ++k) {
+      sum += a(r, k) * two[k];
+      last += a(r, k) * b(k, 2);
+    }
+    std::memcpy(&out(r, 0), &sum.v, sizeof sum.v);
+    out(r, 2) = last;
+  }
+  return out;
+}
+
 // aᵀ b
 template <int K, int R, int C, class T>
 [[gnu::always_inline]] inline Mat<R, C, T> transpose_times(const Mat<K, R>& a, const Mat<K, C, T>& b) {

@@ -106,30 +106,37 @@ class Riccati {
     }
   }
 
-  // Solves W right-hand sides side by side. Beyond `reach` none acts, and neither does anything act on a state.
+  // Solves W right-hand sides side by side. Beyond `reach` none acts, and neither does anything act on a state; beyond
+  // `coupled` no force does, so that the controls of each segment move by themselves.
   template <int W>
   void sweep(const Load* loads) {
     using Lanes = Pack<W>;
     const int n = static_cast<int>(stages.size());
     Vec<NX, Lanes> v;
-    int reach = 0;
+    bool sloped = false;
+    int forced = 0;
     for (int k = 0; k < W; ++k) {
-      if (loads[k].slope) reach = n;
-      for (const Force& force : loads[k].forces) reach = std::max(reach, force.node + force.split);
+      sloped |= loads[k].slope != nullptr;
+      for (const Force& force : loads[k].forces) forced = std::max(forced, force.node + force.split);
     }
+    const int reach = sloped ? n : forced, coupled = std::max(forced, idle_);
     for (int i = reach; i < n; ++i)
       for (int k = 0; k < W; ++k) loads[k].du[i] = {};
     for (int i = reach - 1; i >= 0; --i) {
       const Stage& s = stages[i];
-      for (int k = 0; k < W; ++k)
+      for (int k = 0; k < W && i < forced; ++k)
         for (const Force& force : loads[k].forces) {
           if (force.node == i + 1) subtract(force.here, k, v);
           if (force.node == i && force.split) subtract(force.next, k, v);
         }
-      Vec<NU, Lanes> h = transpose_times(s.b, v);
+      Vec<NU, Lanes> h;
+      if (i < coupled) {
+        h = transpose_times(s.b, v);
+        v = transpose_times(s.a, v);
+      }
       for (int k = 0; k < W; ++k)
-        for (int c = 0; c < NU && loads[k].slope; ++c) h[c].v[k] += loads[k].slope[i][c];
-      v = transpose_times(s.a, v);
+        if (const Vec<NU>* slope = loads[k].slope)
+          for (int c = 0; c < NU; ++c) h[c].v[k] += slope[i][c];
       if (i < idle_) v -= transpose_times(gain_[i], h);
       solve_factored(factor_[i], h);
       for (int k = 0; k < W; ++k)

@@ -34,11 +34,12 @@ struct ArcPull {
 struct ArcLaw {
   static constexpr int kControl = 3, kArc = 30, kShared = 11, kCable = 4, kAdjoint = 6, kHessian = 6;
 
-  // Evaluates the law `ccr_spatial_arc` of n segments, and the values that the other laws take.
-  static void bend(int n, double length, const Rows& controls, Arc* arcs, Rows& shared);
+  // Evaluates the law `ccr_spatial_arc` of n segments, and the values that the other laws take. Returns whether all
+  // segments have the same controls.
+  static bool bend(int n, double length, const Rows& controls, Arc* arcs, Rows& shared);
 
-  // Evaluates the law `ccr_spatial_cable` of each cable.
-  static void measure(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared);
+  // Evaluates the law `ccr_spatial_cable` of each cable, along segments that are `alike` or not.
+  static void measure(std::span<const ArcCable> cables, const Rows& controls, const Rows& shared, bool alike = false);
 
   // Contracts the second derivatives of n segments with their adjoints and the pulls of cables, by the laws
   // `ccr_spatial_arc_hessian` and `ccr_spatial_cable_hessian`. The rows are those of the lower triangle.

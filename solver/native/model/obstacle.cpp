@@ -66,6 +66,15 @@ void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> poin
 }
 
 template <int D>
+void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> points, const Position<D>& moved,
+                  std::span<const int> contacts, int first, double* gaps) {
+  with_law(obstacle, [&](auto, auto law) {
+    for (const int contact : contacts)
+      gaps[contact] = evaluate(law, obstacle, minus(points[contact - first], moved)).value;
+  });
+}
+
+template <int D>
 double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> points) {
   const int count = static_cast<int>(points.size());
   if (obstacle.wall()) {
@@ -81,6 +90,8 @@ double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> point
 }
 
 #define CCR_INSTANTIATE(D)                                                                                   \
+  template void measure_gaps(const Obstacle<D>&, std::span<const Position<D>>, const Position<D>&,           \
+                             std::span<const int>, int, double*);                                            \
   template Gap<D> measure_gap(const Obstacle<D>&, const Position<D>&);                                       \
   template void measure_gaps(const Obstacle<D>&, std::span<const Position<D>>, const Position<D>&, double*); \
   template double clearance(const Obstacle<D>&, std::span<const Position<D>>);

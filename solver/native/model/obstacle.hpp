@@ -71,6 +71,11 @@ template <int D>
 void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> points, const Position<D>& moved,
                   double* gaps);
 
+// Writes those of some points as gaps[contact], where contact `first` is that of the first of all points.
+template <int D>
+void measure_gaps(const Obstacle<D>& obstacle, std::span<const Position<D>> points, const Position<D>& moved,
+                  std::span<const int> contacts, int first, double* gaps);
+
 // Returns a lower bound on the distance of the nearest point from the obstacle.
 template <int D>
 double clearance(const Obstacle<D>& obstacle, std::span<const Position<D>> points);

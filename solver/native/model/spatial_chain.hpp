@@ -3,6 +3,8 @@
 // chord_slope and turn_slope.
 #pragma once
 
+#include <algorithm>
+
 #include "math/linalg.hpp"
 #include "math/rotations.hpp"
 
@@ -42,9 +44,9 @@ inline constexpr Mat<3, 3> kBaseFrame = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
 
 // Point on a disk, from its center, at a place in its frame.
 inline Vec<3> disk_lever(const Mat<3, 3>& frame, const Vec<2>& place) {
-  Vec<3> lever;
-  for (int k = 0; k < 3; ++k) lever[k] = frame(k, 0) * place[0] + frame(k, 1) * place[1];
-  return lever;
+  const Pack<2> across{{frame(0, 0), frame(1, 0)}}, along{{frame(0, 1), frame(1, 1)}};
+  const Pack<2> level = across * place[0] + along * place[1];
+  return {{level.v[0], level.v[1], frame(2, 0) * place[0] + frame(2, 1) * place[1]}};
 }
 
 // Finds state and frame of the upper disk of a segment. Returns its chord in the base frame.
@@ -66,6 +68,10 @@ struct Wrench {
       moment[k] -= node_force[3 + k];
     }
   }
+  bool acts() const {
+    return std::any_of(force.v.begin(), force.v.end(), [](double part) { return part != 0; }) ||
+           std::any_of(moment.v.begin(), moment.v.end(), [](double part) { return part != 0; });
+  }
   Wrench in(const Mat<3, 3>& frame) const { return {transpose_times(frame, force), transpose_times(frame, moment)}; }
 };
 
@@ -76,16 +82,14 @@ void assemble_stage(const Bend& bend, const Vec<3>& chord, const Mat<3, 3>& fram
                     Mat<6, 6>& node_hessian) {
   stage.a.chord = chord;
   const Mat<3, 3> chord_slope = times(frame, bend.chord_slope), turn_slope = times(frame, bend.turn_slope);
+  std::copy_n(turn_slope.v.begin(), 9, std::copy_n(chord_slope.v.begin(), 9, stage.b.v.begin()));
+  node_hessian.v.fill(0);
+  stage.hux.v.fill(0);
+  if (!local.acts()) return;
   const Vec<3> force = times(frame, local.force), moment = times(frame, local.moment);
-  const Mat<3, 3> turned = hessian_contraction(stage.a.chord, force);
-  node_hessian = {};
+  const Mat<3, 3> turned = hessian_contraction(chord, force);
   for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) {
-      stage.b(r, c) = chord_slope(r, c);
-      stage.b(3 + r, c) = turn_slope(r, c);
-      node_hessian(3 + r, 3 + c) = turned(r, c);
-    }
-  stage.hux = {};
+    for (int c = 0; c < 3; ++c) node_hessian(3 + r, 3 + c) = turned(r, c);
   for (int k = 0; k < 3; ++k) {
     const Vec<3> swung = cross(Vec<3>{{chord_slope(0, k), chord_slope(1, k), chord_slope(2, k)}}, force);
     const Vec<3> twisted = cross(Vec<3>{{turn_slope(0, k), turn_slope(1, k), turn_slope(2, k)}}, moment);

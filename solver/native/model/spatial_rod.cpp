@@ -49,10 +49,10 @@ bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& co
   length_ = command.length / n;
   for (int k = 0; k < kControl; ++k)
     for (int i = 0; i < n; ++i) controls_.row(k)[i] = controls[i][k];
-  ArcLaw::bend(n, length_, controls_, arcs_.data(), shared_);
+  const bool alike = ArcLaw::bend(n, length_, controls_, arcs_.data(), shared_);
   for (int i = 0; i < n; ++i) chords_[i] = move_up(arcs_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
   add_strain(controls);
-  take_up_cables();
+  take_up_cables(alike);
   return std::isfinite(objective) && widest <= tolerances::kWidestTurn;
 }
 
@@ -61,10 +61,10 @@ void SpatialRod::add_strain(const std::vector<Control>& controls) {
   double energy = 0, largest = 0, square = 0;
   for (int i = 0; i < robot_.segments; ++i, stiffness += kControl, rest += kControl) {
     for (int k = 0; k < kControl; ++k) {
-      const double strain = controls[i][k] - rest[k], slope = 2 * stiffness[k] * strain;
+      const double strain = controls[i][k] - rest[k], twice = 2 * stiffness[k];
       energy += stiffness[k] * strain * strain;
-      strain_slopes_[i][k] = slope;
-      largest = std::max(largest, std::max(std::abs(slope), std::abs(2 * stiffness[k] * controls[i][k])));
+      strain_slopes_[i][k] = twice * strain;
+      largest = std::max(largest, twice * std::max(std::abs(strain), std::abs(controls[i][k])));
     }
     square = std::max(square, dot(controls[i], controls[i]));
   }
@@ -73,24 +73,29 @@ void SpatialRod::add_strain(const std::vector<Control>& controls) {
   widest = std::sqrt(square);
 }
 
-void SpatialRod::take_up_cables() {
-  ArcLaw::measure(arc_cables_, controls_, shared_);
+void SpatialRod::take_up_cables(bool alike) {
+  ArcLaw::measure(arc_cables_, controls_, shared_, alike);
   cables_.clear();
   for (int k = 0; k < cables_.count(); ++k) {
+    const auto& [hole, end, distances, slopes] = arc_cables_[k];
     double taken = 0;
-    for (int i = 0; i < arc_cables_[k].end; ++i) taken += length_ - arc_cables_[k].distances[i];
+#pragma GCC unroll 4
+    for (int i = 0; i < end; ++i) taken += length_ - distances[i];
     cables_.set_taken(k, taken);
   }
 }
 
 void SpatialRod::propagate_adjoints(const std::vector<State>& node_forces) {
   Wrench wrench;
+  bool acts = false;
   for (int i = robot_.segments - 1; i >= 0; --i) {
     wrench.subtract(node_forces[i + 1]);
-    const Wrench& local = wrenches_[i] = wrench.in(frames[i]);
+    acts = acts || wrench.acts();
+    const Wrench& local = wrenches_[i] = acts ? wrench.in(frames[i]) : Wrench{};
     adjoints_.put(i, local.force.v.data(), 3);
     adjoints_.put(i, local.moment.v.data(), 3, 3);
     gradient[i] = strain_slopes_[i];
+    if (!acts) continue;
     gradient[i] += transpose_times(arcs_[i].chord_slope, local.force);
     gradient[i] += transpose_times(arcs_[i].turn_slope, local.moment);
     wrench.moment += cross(chords_[i], wrench.force);

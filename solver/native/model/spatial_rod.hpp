@@ -74,7 +74,7 @@ class SpatialRod {
 
  private:
   void add_strain(const std::vector<Control>& controls);
-  void take_up_cables();
+  void take_up_cables(bool alike);
 
   Robot robot_;
   double length_ = 0;  // of a segment [mm]

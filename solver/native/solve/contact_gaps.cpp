@@ -8,24 +8,34 @@
 
 namespace ccr {
 
+// Writes the points of all lines at a node, the first one to `point`.
+template <class Model>
+void place_node(const Robot& robot, const Position<Model::kSpace>& node, const typename Model::Frame& frame,
+                Position<Model::kSpace>* point) {
+  const auto at = node;  // copies that no point written may change
+  const auto turned = frame;
+  for (const Vec<2>& line : robot.lines) {
+    Position<Model::kSpace> placed = at;
+    placed += Model::lever(turned, line);
+    *point = placed;
+    point += robot.positions();
+  }
+}
+
 template <class Model>
 void place_points(const Robot& robot, std::span<const Position<Model::kSpace>> nodes,
                   std::span<const typename Model::Frame> frames, std::vector<Position<Model::kSpace>>& points) {
   const int stride = robot.between + 1;
+  for (int i = 0; i <= robot.segments; ++i) place_node<Model>(robot, nodes[i], frames[i], points.data() + i * stride);
+  if (stride == 1) return;
   auto* point = points.data();
-  for (const Vec<2>& line : robot.lines) {
-    for (int i = 0; i <= robot.segments; ++i) {
-      point[i * stride] = nodes[i];
-      point[i * stride] += Model::lever(frames[i], line);
-    }
-    for (int i = 0; stride > 1 && i < robot.segments; ++i)
+  for (std::size_t line = 0; line < robot.lines.size(); ++line, point += robot.positions())
+    for (int i = 0; i < robot.segments; ++i)
       for (int k = 1; k < stride; ++k) {
         const auto &here = point[i * stride], &next = point[(i + 1) * stride];
         const double t = static_cast<double>(k) / stride;
         for (int c = 0; c < Model::kSpace; ++c) point[i * stride + k][c] = here[c] + t * (next[c] - here[c]);
       }
-    point += robot.positions();
-  }
 }
 
 template <class Model>
@@ -38,6 +48,7 @@ template <class Model>
 void ContactProblem<Model>::update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts) {
   std::copy(nodes.begin(), nodes.end(), origin_.begin());
   mount_origin_ = mounts;
+  evaluated_ = false;
   for (std::size_t j = 0; j < obstacles_.size(); ++j) {
     clear_[j] = clearance(obstacles_[j], nodes) - reach_;
     if (mount_of_[j] >= 0) clear_[j] -= norm(mounts[mount_of_[j]]);
@@ -70,22 +81,23 @@ void ContactProblem<Model>::measure_gaps() {
     const Obstacle& obstacle = obstacles_[j];
     const Position moved = this->displacement(j);
     const int first = j * points;
+    const std::size_t others = near_.size();
     for (int i = 0; i <= n; ++i) {
       const double distance = clearance_beyond(obstacle, minus(nodes_[i], moved), reach_);
       if (distance > 0) {
         i += static_cast<int>(std::min(distance / model_.segment_length(), static_cast<double>(n)));
         continue;
       }
-      if (stride > 1) place_all();
-      for (int start = i * stride; start < points; start += positions) {
-        if (stride == 1) place(i, robot_.lines[start / positions], points_[start]);
-        for (int k = start; k < start + (i < n ? stride : 1); ++k) {
-          if (!obstacle.touchable[k]) continue;
-          ccr::measure_gaps(obstacle, std::span<const Position>(&points_[k], 1), moved, &gaps_[first + k]);
-          near_.push_back(first + k);
-        }
-      }
+      if (stride > 1)
+        place_all();
+      else
+        place_node<Model>(robot_, nodes_[i], frames()[i], &points_[i]);
+      for (int start = i * stride; start < points; start += positions)
+        for (int k = start; k < start + (i < n ? stride : 1); ++k)
+          if (obstacle.touchable[k]) near_.push_back(first + k);
     }
+    ccr::measure_gaps(obstacle, std::span<const Position>(points_), moved, std::span(near_).subspan(others), first,
+                      gaps_.data());
   }
 }
 

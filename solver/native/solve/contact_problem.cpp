@@ -12,6 +12,7 @@ template <class Model>
 ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
     : robot_(robot),
       model_(robot),
+      controls_(robot.segments),
       origin_(robot.segments + 1),
       clear_(obstacles),
       nodes_(robot.segments + 1),
@@ -28,6 +29,7 @@ template <class Model>
 void ContactProblem<Model>::set_robot(const Robot& robot) {
   robot_ = robot;
   model_.set_robot(robot);
+  evaluated_ = false;
   const int stride = robot.between + 1;
   sites_.clear();
   farthest_line_ = 0;
@@ -43,6 +45,7 @@ void ContactProblem<Model>::set_robot(const Robot& robot) {
 template <class Model>
 void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
   obstacles_ = obstacles;
+  evaluated_ = false;
   motions_ = {};
   largest_motion_ = 0;
   for (const int contact : near_) gaps_[contact] = std::numeric_limits<double>::infinity();
@@ -57,6 +60,8 @@ void ContactProblem<Model>::set_obstacles(std::span<const Obstacle> obstacles) {
 
 template <class Model>
 bool ContactProblem<Model>::evaluate(const Iterate& at) {
+  if (is_evaluated(at)) return true;
+  evaluated_ = has_gradient_ = false;
   if (!model_.evaluate(at.command, at.controls)) return false;
   loaded_ = at.command.loads;
   if (is_moving()) place_obstacles(at.command.scene);
@@ -69,6 +74,9 @@ bool ContactProblem<Model>::evaluate(const Iterate& at) {
   all_placed_ = false;
   measure_gaps();
   if constexpr (Model::kRod) measure_slacks_and_disks(at.command);
+  command_ = at.command;
+  controls_ = at.controls;
+  evaluated_ = true;
   return true;
 }
 
@@ -209,6 +217,9 @@ double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) co
 
 template <class Model>
 void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
+  if (has_gradient_ && pressed_ == active) return;
+  has_gradient_ = true;
+  pressed_ = active;
   std::fill(node_forces_.begin(), node_forces_.end(), State{});
   Vec<Model::kCables> slack_multipliers{};
   if constexpr (Model::kRod) add_loads(node_forces_);

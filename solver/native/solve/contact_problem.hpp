@@ -2,6 +2,7 @@
 // subject to gaps c >= 0 of its points.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
@@ -20,6 +21,11 @@ struct ActiveSet {
   int count = 0;
   std::array<int, tolerances::kMaxActive> contact;
   std::array<double, tolerances::kMaxActive> multiplier;
+
+  friend bool operator==(const ActiveSet& a, const ActiveSet& b) {
+    return a.count == b.count && std::equal(a.contact.begin(), a.contact.begin() + a.count, b.contact.begin()) &&
+           std::equal(a.multiplier.begin(), a.multiplier.begin() + a.count, b.multiplier.begin());
+  }
 
   void drop(int j) {
     --count;
@@ -102,18 +108,21 @@ class ContactProblem {
   // shape.
   void update_broadphase(std::span<const Position> nodes, const std::vector<Position>& mounts);
 
-  // Evaluates energy, points and gaps; false where a control is out of range of the segment law.
+  // Evaluates energy, points and gaps, if not done already; false where a control is out of range of the segment law.
   bool evaluate(const Iterate& at);
 
   // While `on`, adds a barrier energy to segments that come near to folding over, which no equilibrium of interest does
   // but a descent might.
-  void enable_barrier(bool on) { barrier_enabled_ = on; }
+  void enable_barrier(bool on) {
+    barrier_enabled_ = on;
+    evaluated_ = false;
+  }
   bool in_barrier() const { return barrier_energy_ > 0; }  // whether a segment of the last shape is in the barrier
 
   // Sets the equilibrium of the robot that nothing touches, where it has a closed form.
   void set_free_shape(Iterate& at);
 
-  // Computes the gradient of the Lagrangian J - Σ λ c in controls and mounts.
+  // Computes the gradient of the Lagrangian J - Σ λ c in controls and mounts, if not done already.
   void reduced_gradient(const ActiveSet& active);
   // Exact Hessian of the Lagrangian, and the tensions of the cables [N]; both follow reduced_gradient.
   void lagrangian_hessian(const ActiveSet& active, System& system) const;
@@ -169,6 +178,12 @@ class ContactProblem {
   const std::vector<Control>& gradient() const { return model_.gradient; }
 
  private:
+  bool is_evaluated(const Iterate& at) const {
+    const auto same = [](const auto& a, const auto& b) { return a.v == b.v; };
+    return evaluated_ && std::equal(controls_.begin(), controls_.end(), at.controls.begin(), same) &&
+           command_ == at.command && std::equal(displacements_.begin(), displacements_.end(), at.mounts.begin(), same);
+  }
+
   // Location of a point: a fraction of the way from a node to the next, on a line across the disks.
   struct Site {
     int node;
@@ -195,10 +210,6 @@ class ContactProblem {
   void place_obstacles(double part);
   // Those of a shape are placed where they are looked at: most are out of reach of all obstacles.
   void place_all() const;
-  void place(int node, const Vec<2>& line, Position& point) const {
-    point = nodes_[node];
-    point += Model::lever(frames()[node], line);
-  }
   void measure_slacks_and_disks(const Command& command) requires(Model::kRod);
   void push_disks(const ActiveSet& active) requires(Model::kRod);
   int disk_segment(int contact) const { return (contact - first_disk_contact()) / Model::kDiskSides; }
@@ -217,8 +228,13 @@ class ContactProblem {
   double farthest_line_ = 0;       // distance of a line of points from the backbone
   double reach_ = 0;               // distance of a node from an obstacle within which its points are measured
   double energy_ = 0;
-  double loaded_ = 1;      // part of the loads that act
-  double load_slope_ = 0;  // bound on the slope of their work in a control
+  bool evaluated_ = false;         // whether all is that of
+  Command command_{};              // this command,
+  std::vector<Control> controls_;  // these controls, and the displacements of the mounts
+  bool has_gradient_ = false;      // whether the gradient is that of the same, and
+  ActiveSet pressed_;              // these multipliers
+  double loaded_ = 1;              // part of the loads that act
+  double load_slope_ = 0;          // bound on the slope of their work in a control
   bool barrier_enabled_ = false;
   double barrier_energy_ = 0;
   std::vector<Control> barrier_slope_;  // of each segment

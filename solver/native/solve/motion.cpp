@@ -26,6 +26,7 @@ void mix(const std::array<double, N>& from, const std::array<double, N>& to, dou
 
 template <class Model>
 void ContactProblem<Model>::move_obstacles(std::span<const Obstacle> towards, std::span<const double> motions) {
+  evaluated_ = false;
   origins_ = obstacles_;
   towards_ = towards;
   motions_ = motions;

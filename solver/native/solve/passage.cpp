@@ -1,6 +1,7 @@
 // Whether the robot passed through an obstacle on the straight ways from the last accepted shape to the trial shape.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "model/models.hpp"
 #include "solve/model_continuation.hpp"
@@ -49,21 +50,30 @@ bool ModelContinuation<Model>::passage_is_clear(int j, double moved) const {
   Position before = mount < 0 ? Position{} : mounts_[mount];
   before += problem_.displacement(j, trial_.command.scene, present_.command.scene);
   const double path = harmless_path(obstacle);
+  const std::vector<Position>& points = problem_.points();
   const auto from = [&](int k) { return minus(points_[k], before); };
-  const auto to = [&](int k) { return minus(problem_.points()[k], now); };
-  const auto away = [&](int k) {  // on all of its way; a gap out of reach is not measured
-    return std::isfinite(gaps[k]) ? distance_outside(obstacle, gaps[k]) >= moved
-                                  : clearance_beyond(obstacle, to(k), moved) > 0;
-  };
+  const auto to = [&](int k) { return minus(points[k], now); };
   for (int line = 0, first = 0; line < static_cast<int>(robot.lines.size()); ++line, first += robot.positions()) {
     const double longest = robot.edges[line];
     const bool edges = moved > harmless_motion(obstacle, longest);
+    bool close = false, was_close;  // on a part of its way, this point and the one before
     for (int k = first; k < first + robot.positions(); ++k) {
+      was_close = std::exchange(close, false);
+      if (std::isfinite(gaps[k])) {
+        close = distance_outside(obstacle, gaps[k]) < moved;
+      } else if (const double distance = clearance_beyond(obstacle, to(k), moved); distance > 0) {
+        // A gap out of reach is not measured. The next points are too close to this one to be within reach.
+        if (!was_close) {
+          k += static_cast<int>(std::min(distance / longest, static_cast<double>(robot.positions())));
+          continue;
+        }
+      } else {
+        close = true;
+      }
       if (!obstacle.touchable[k]) continue;
-      if (!away(k) && norm(minus(to(k), from(k))) > path && !path_clear(obstacle, from(k), to(k))) return false;
-      if (!edges || k + 1 == first + robot.positions() || !obstacle.touchable[k + 1] || (away(k) && away(k + 1)))
-        continue;
-      if (!edge_clear<kSpace>(obstacle, {from(k), from(k + 1)}, {to(k), to(k + 1)}, longest / 2)) return false;
+      if (close && norm(minus(to(k), from(k))) > path && !path_clear(obstacle, from(k), to(k))) return false;
+      if (!edges || k == first || !obstacle.touchable[k - 1] || !(close || was_close)) continue;
+      if (!edge_clear<kSpace>(obstacle, {from(k - 1), from(k)}, {to(k - 1), to(k)}, longest / 2)) return false;
     }
   }
   return true;

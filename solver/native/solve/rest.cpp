@@ -89,16 +89,30 @@ bool ModelContinuation<Model>::is_clear_at(const Command& start, double part) {
   return false;
 }
 
-// Tensions of the free robot where it first touches, found by bisection, each with the sign of its displacement.
+// Tensions of the free robot where it first touches, each with the sign of its displacement. The place is found by
+// bisection; of a robot that bends evenly, whose gaps are known on both sides, by false position (Illinois).
 template <class Model>
 ModelContinuation<Model>::Tensions ModelContinuation<Model>::first_tensions(const Command& start) {
-  const auto clear = [&](double part) { return is_clear_at(start, part); };
-  double low = 0, high = 1;
-  if (!clear(high))
-    for (int i = 0; i < kOnsetBisections; ++i) {
-      const double middle = (low + high) / 2;
-      (clear(middle) ? low : high) = middle;
-    }
+  const auto clear = [&](int part) { return is_clear_at(start, static_cast<double>(part) / kOnsetParts); };
+  const auto nearest = [&] {  // gap of any obstacle where that was asked last
+    double gap = HUGE_VAL;
+    for (const int contact : problem_.near_contacts())
+      if (contact < problem_.contacts()) gap = std::min(gap, problem_.gaps()[contact]);
+    return gap;
+  };
+  int low = 0, high = kOnsetParts, last = 0;
+  const bool touches = !clear(high);
+  double above = HUGE_VAL, below = nearest();  // gaps there
+  while (touches && high - low > 1) {
+    const bool known = bends_evenly_ && above > 0 && above < HUGE_VAL && below < 0;
+    const double share = known ? above / (above - below) : 0.5;
+    const int middle = std::clamp(low + static_cast<int>((high - low) * share), low + 1, high - 1);
+    const int side = clear(middle) ? 1 : -1;
+    (side > 0 ? low : high) = middle;
+    (side > 0 ? above : below) = nearest();
+    if (side == last) (side > 0 ? below : above) /= 2;
+    last = side;
+  }
   clear(bends_evenly_ ? high : low);
   problem_.reduced_gradient(trial_.active);
   Tensions tensions = problem_.tensions(trial_.active);
