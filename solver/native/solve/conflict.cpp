@@ -11,25 +11,39 @@ namespace ccr {
 using namespace tolerances;
 
 // Follows the branch from `present_` to its end short of a command where gaps conflict, and raises the tensions of the
-// cables among them to the limit. Without a limit, or where there are no cables among them, the robot is blocked.
+// cables among them to the limit. Without a limit, or where there are no cables among them, the robot is blocked unless
+// it buckles.
 template <class Model>
 ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const Command& command) {
   for (int i = 0; Model::kRod && i < kMaxCables; ++i) {  // each closes a gap, which may let others conflict
     const ActiveSet conflict = newton_.conflict();
     if (conflict.count == 0) break;
     evaluate_present();
-    const int newcomer = conflict.contact[conflict.count - 1];
-    if (problem_.gaps()[newcomer] <= kFeasibility * problem_.robot().max_length) {
+    if (remaining_gap(conflict) <= kFeasibility * problem_.robot().max_length) {
       if (!can_tighten(conflict)) return Conflict::kBlocked;
       return raise_tensions(conflict) ? Conflict::kTight : Conflict::kNone;
     }
-    if (!close_gap(command, newcomer)) break;
+    if (!close_gap(command, conflict)) break;
     trial_ = present_;
     trial_.command = command;
     present_evaluated_ = false;
     if (newton_.solve(trial_, 0).converged) break;
   }
   return Conflict::kNone;
+}
+
+// The widest gap among those that conflict, were the others exactly closed: that which was to close last may be closed
+// already, and those that are closed may be violated within the tolerance.
+template <class Model>
+double ModelContinuation<Model>::remaining_gap(const ActiveSet& conflict) const {
+  int widest = conflict.count - 1;
+  double sum = 0;
+  for (int j = 0; j < conflict.count; ++j) {
+    if (!(conflict.multiplier[j] > 0)) continue;
+    if (problem_.gaps()[conflict.contact[j]] > problem_.gaps()[conflict.contact[widest]]) widest = j;
+    sum += conflict.multiplier[j] * problem_.gaps()[conflict.contact[j]];
+  }
+  return sum / conflict.multiplier[widest];
 }
 
 // Whether tensions of conflicting gaps can rise to a limit.
@@ -41,21 +55,23 @@ bool ModelContinuation<Model>::can_tighten(const ActiveSet& conflict) const {
   return pulled && std::isfinite(problem_.robot().max_tension);
 }
 
-// Follows the branch towards a command, which is beyond its end, to where a gap closes, by the secant method.
+// Follows the branch towards a command, which is beyond its end, to where the gaps that conflict are all closed, by the
+// secant method.
 template <class Model>
-bool ModelContinuation<Model>::close_gap(const Command& command, int contact) {
+bool ModelContinuation<Model>::close_gap(const Command& command, const ActiveSet& conflict) {
   const Command start = present_.command;
-  const double span = command_distance(start, command);
-  double low = 0, high = 1, gap = problem_.gaps()[contact], slope = -gap;
+  const double span = command_distance(start, command), tolerance = kFeasibility * problem_.robot().max_length;
+  double low = 0, high = 1, gap = remaining_gap(conflict), slope = -gap;
   for (int i = 0; i < kStallIterations && (high - low) * span > kCommandResolution; ++i) {
     const double width = high - low, part = std::clamp(low - gap / slope, low + 1e-3 * width, high - 1e-3 * width);
-    if (try_command(between(start, command, part)) == Move::kAccepted) {
+    const bool accepted = try_command(between(start, command, part)) == Move::kAccepted;
+    const double now = remaining_gap(conflict);
+    if (accepted && now >= -tolerance) {
       accept();
-      const double now = problem_.gaps()[contact];
       slope = (now - gap) / (part - low);
       low = part;
       gap = now;
-      if (gap <= kFeasibility * problem_.robot().max_length) return true;
+      if (gap <= tolerance) return true;
       if (!(slope < 0)) return false;
     } else {
       high = part;

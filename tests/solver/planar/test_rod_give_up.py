@@ -1,0 +1,58 @@
+"""Steps of rods with several cables that used to be given up on, though the robot stalls or has somewhere to go."""
+
+import math
+
+import numpy as np
+import pytest
+from soak.episodes import Episode, setting_of
+from soak.walks import sample_increments, walk
+
+from solver import Cable, Robot, Scene, Solver, Status
+
+PAIR = (Cable(), Cable(angle=math.pi))
+SMALL = Robot(length_mm=18.0, segments=9, offset_mm=0.8, rigidity=50.0, max_tension=15.0, between=1, cables=PAIR)
+UNEVEN = Robot.prototype(
+    model="rod",
+    segments=9,
+    cables=(Cable(offset_mm=6.836858445908845), Cable(angle=math.pi, offset_mm=2.286434033542001)),
+)
+SECTIONS = Robot.prototype(
+    model="rod",
+    segments=30,
+    length_range_mm=(100.0, 180.0),
+    length_mm=112.16006554011628,
+    cables=(
+        Cable(end=14),
+        Cable(angle=math.pi, end=14),
+        Cable(offset_mm=5.784630726327244),
+        Cable(angle=math.pi, offset_mm=2.660753789111226),
+    ),
+)
+STRONG = Robot.prototype(model="rod", segments=9, cables=PAIR, max_tension=100.0)
+BUCKLING = 6 * STRONG.rigidity * (STRONG.segments / STRONG.length_mm) ** 2  # of each of two cables [N]
+
+
+def follow(robot, *commands):
+    solver = Solver(robot, Scene([]))
+    states = [solver.rest()]
+    for command in commands:
+        states.append(solver.step(states[-1], *command))
+    assert max(solver.optimality(states[-1])) < 1e-9
+    return states
+
+
+def test_a_pair_that_crosses_its_straight_shape_stalls_where_both_cables_are_taut():
+    """The gap that closes last there is that of the cable which slackens, and it is closed already."""
+    start, command = (-0.5028631965306289, 0.08678653871598693), (0.04786299808766159, -0.00826042543032883)
+    *_, stalled = follow(SMALL, (start,), (command,))
+    assert stalled.status is Status.STALLED
+    assert stalled.tensions.max() == pytest.approx(15, rel=1e-6)
+    assert stalled.cables_mm == pytest.approx([-command[1], command[1]], abs=1e-5)
+
+
+def test_cables_conflict_though_one_is_a_little_too_short_within_the_tolerance():
+    start, command = (-8.67513550502513, 2.9287482960450277), (-8.62633992384139, 3.1882937232808097)
+    *_, stalled = follow(UNEVEN, (start,), (command,))
+    assert stalled.status is Status.STALLED
+    assert stalled.tensions.max() == pytest.approx(15, rel=1e-6)
+    assert stalled.tensions.min() > 0.1
