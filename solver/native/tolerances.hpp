@@ -91,6 +91,7 @@ inline constexpr int kOnsetBisections = 20;  // bisections for where a contact b
 inline constexpr double kTensionBand = 1e-6;
 inline constexpr double kTight = 100.0;      // tension over EI/aL from which sub-steps below kSmallestStep are tried
 inline constexpr double kTightStep = 1e-11;  // the smallest of them [a]
+inline constexpr double kRefining = 1e-2;    // of the sub-step before a branch counts as ended, where nothing leads on
 inline constexpr double kBalance = 1e-5;  // residual of multipliers that balance each other, over the largest of them
 inline constexpr double kPeakStep = 1.25e-3;  // sub-step within which a peak of the tension is ignored [a]
 inline constexpr int kSettling = 3;           // iterations for an equilibrium of cables that pull against each other

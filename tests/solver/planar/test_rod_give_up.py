@@ -56,3 +56,10 @@ def test_cables_conflict_though_one_is_a_little_too_short_within_the_tolerance()
     assert stalled.status is Status.STALLED
     assert stalled.tensions.max() == pytest.approx(15, rel=1e-6)
     assert stalled.tensions.min() > 0.1
+
+
+def test_two_sections_go_on_in_finer_steps_where_tensions_rise_steeply():
+    start = (-4.936952947326009, 4.950593722316127, -9.108863147947078, 3.7170701015328165)
+    command = (-6.076529171560363, 9.985524129694294, -8.818712289374696, 8.755964233939288)
+    *_, stalled = follow(SECTIONS, (start, 180.0), (command, 180.0))
+    assert stalled.status is Status.STALLED
