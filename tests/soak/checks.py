@@ -26,7 +26,6 @@ REPEATS = 300  # of a command that was given up on, each of which must come near
 PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
 STALLED_AGAIN = 3  # stalled steps of an episode that are repeated
 MOVED_ON = 1e-4  # of the offset: a repeated command that stalled must not lead farther
-BUCKLING = 0.9  # of the tension 6 EI/l0² at which cables that pull against each other bend segments against each other
 UNPULLED = 10  # contact force over the tension: beyond what the cables can cause
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
 
@@ -180,8 +179,7 @@ def _reason(solver, taken, k):
     one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
     more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
     draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
-    limit to that. ``unlimited``: no tension limit short of 6 EI/l0² keeps cables that pull against each other from
-    buckling the robot segment by segment.
+    limit to that.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = _trace(solver, taken.states[k], command).reason
@@ -194,9 +192,6 @@ def _reason(solver, taken, k):
             return "slack"
     elif robot.model == "paper" and np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"
-    buckling = 6 * robot.rigidity * (robot.segments / state.length_mm) ** 2
-    if len(robot.cables) > 1 and robot.model == "rod" and robot.max_tension > BUCKLING * buckling:
-        return "unlimited"
     state = _repeated(solver, state, command)
     if state.status != Status.GAVE_UP:
         return "far"

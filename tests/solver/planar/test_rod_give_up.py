@@ -63,3 +63,17 @@ def test_two_sections_go_on_in_finer_steps_where_tensions_rise_steeply():
     command = (-6.076529171560363, 9.985524129694294, -8.818712289374696, 8.755964233939288)
     *_, stalled = follow(SECTIONS, (start, 180.0), (command, 180.0))
     assert stalled.status is Status.STALLED
+
+
+def test_cables_that_no_limit_stops_buckle_the_robot_segment_by_segment():
+    """A segment of EI and l0 under two cables in line buckles at 12 EI/l0² together; the segments bend to and fro."""
+    _, buckled, tighter, free = follow(STRONG, ((1.0, 0.0),), ((2.0, 0.0),), ((0.0, 0.0),))
+    assert buckled.status is Status.SNAPPED
+    assert tighter.status <= Status.SNAPPED
+    for state, pulled in (buckled, 1.0), (tighter, 2.0):
+        assert state.cables_mm == pytest.approx([pulled, 0.0], abs=1e-9)
+        assert state.tensions.sum() == pytest.approx(2 * BUCKLING, rel=0.05)
+        turns = np.diff(state.nodes[:, 2])
+        assert turns.min() < 0 < turns.max()
+    assert free.status <= Status.SNAPPED
+    assert free.nodes[:, 0] == pytest.approx(np.zeros(10), abs=1e-2)
