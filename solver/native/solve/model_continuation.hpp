@@ -139,8 +139,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
   // Gaps that no motion satisfies together.
   Conflict meet_conflict(const Command& command);
-  bool can_tighten(const ActiveSet& conflict) const;
   double remaining_gap(const ActiveSet& conflict) const;
+  bool can_tighten(const ActiveSet& conflict) const;
   bool close_gap(const Command& command, const ActiveSet& conflict);
   bool raise_tensions(const ActiveSet& conflict);
 
@@ -150,6 +150,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   End undo_descent(End end);
   bool leave_towards(const Command& command);
   bool restore_at(const Command& command, bool holding);
+  bool buckle_at(const Command& command);
   bool descend_once(bool& moved);
   bool try_newton();
   bool trial_is_close() const;

@@ -102,6 +102,7 @@ class Newton {
   bool creeping_ = false;      // whether the iterates of this descent hardly move
   double lowest_ = 0;          // energy of this descent when it fell last
   int flat_ = 0;               // iterates since then
+  int dropped_ = 0;            // iterates that would not be stable without a gap that they drop
 };
 
 }  // namespace ccr

@@ -77,3 +77,10 @@ def test_cables_that_no_limit_stops_buckle_the_robot_segment_by_segment():
         assert turns.min() < 0 < turns.max()
     assert free.status <= Status.SNAPPED
     assert free.nodes[:, 0] == pytest.approx(np.zeros(10), abs=1e-2)
+
+
+def test_a_descent_does_not_creep_along_a_contact_that_it_must_leave():
+    setting, generator = setting_of(Episode("pair", 8, 11, 500))
+    increments = sample_increments(generator, setting.solver, setting.scale, 500)
+    states = walk(setting.solver, increments[:316]).states
+    assert max(state.status for state in states) < Status.GAVE_UP
