@@ -297,7 +297,10 @@ bool ActiveSetQp<Model>::balance(const ContactProblem& problem, KktSystem& kkt, 
   Gram gram = factor_gram(active);
   for (; gram == Gram::kDependent; gram = factor_gram(active)) remove_contact(active, dependent_, active.count);
   if (gram == Gram::kUnstable) return false;
-  apply(closing_multipliers(problem, active, step), active, step);
+  Multipliers change;
+  for (int j = 0; j < active.count; ++j) change[j] = -along(j, step);
+  solve_gram(active.count, change);
+  apply(change, active, step);
   for (int j = 0; j < active.count; ++j) active.multiplier[j] = std::max(0.0, active.multiplier[j]);
   return true;
 }

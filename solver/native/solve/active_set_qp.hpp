@@ -37,8 +37,8 @@ class ActiveSetQp {
   bool find_softest(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active, Direction& seed,
                     Direction& softest);
 
-  // Finds the step and the multipliers that balance the gradient and close the active gaps. Leaves out of `active` the
-  // gaps whose slopes depend on those before; they stay as they are and keep the multipliers that the gradient
+  // Finds the step and the multipliers that balance the gradient while the active gaps stay as they are. Leaves out of
+  // `active` the gaps whose slopes depend on those before; they keep the multipliers that the gradient
   // contains. False where H is not positive definite on the tangent space. No multiplier becomes negative.
   bool balance(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 

@@ -19,11 +19,12 @@ ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const
     const ActiveSet conflict = newton_.conflict();
     if (conflict.count == 0) break;
     evaluate_present();
-    if (remaining_gap(conflict) <= kFeasibility * problem_.robot().max_length) {
+    const int open = widest_gap(conflict);
+    if (problem_.gaps()[open] <= kFeasibility * problem_.robot().max_length) {
       if (!can_tighten(conflict)) return Conflict::kBlocked;
       return raise_tensions(conflict) ? Conflict::kTight : Conflict::kNone;
     }
-    if (!close_gap(command, conflict)) break;
+    if (!close_gap(command, open)) break;
     trial_ = present_;
     trial_.command = command;
     present_evaluated_ = false;
@@ -32,18 +33,14 @@ ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const
   return Conflict::kNone;
 }
 
-// The widest gap among those that conflict, were the others exactly closed: that which was to close last may be closed
-// already, and those that are closed may be violated within the tolerance.
+// The gap that is open widest among those that conflict: that which was to close last may be closed already.
 template <class Model>
-double ModelContinuation<Model>::remaining_gap(const ActiveSet& conflict) const {
-  int widest = conflict.count - 1;
-  double sum = 0;
-  for (int j = 0; j < conflict.count; ++j) {
-    if (!(conflict.multiplier[j] > 0)) continue;
-    if (problem_.gaps()[conflict.contact[j]] > problem_.gaps()[conflict.contact[widest]]) widest = j;
-    sum += conflict.multiplier[j] * problem_.gaps()[conflict.contact[j]];
-  }
-  return sum / conflict.multiplier[widest];
+int ModelContinuation<Model>::widest_gap(const ActiveSet& conflict) const {
+  int widest = conflict.contact[conflict.count - 1];
+  for (int j = 0; j < conflict.count; ++j)
+    if (conflict.multiplier[j] > 0 && problem_.gaps()[conflict.contact[j]] > problem_.gaps()[widest])
+      widest = conflict.contact[j];
+  return widest;
 }
 
 // Whether tensions of conflicting gaps can rise to a limit.
@@ -55,23 +52,21 @@ bool ModelContinuation<Model>::can_tighten(const ActiveSet& conflict) const {
   return pulled && std::isfinite(problem_.robot().max_tension);
 }
 
-// Follows the branch towards a command, which is beyond its end, to where the gaps that conflict are all closed, by the
-// secant method.
+// Follows the branch towards a command, which is beyond its end, to where a gap closes, by the secant method.
 template <class Model>
-bool ModelContinuation<Model>::close_gap(const Command& command, const ActiveSet& conflict) {
+bool ModelContinuation<Model>::close_gap(const Command& command, int contact) {
   const Command start = present_.command;
-  const double span = command_distance(start, command), tolerance = kFeasibility * problem_.robot().max_length;
-  double low = 0, high = 1, gap = remaining_gap(conflict), slope = -gap;
+  const double span = command_distance(start, command);
+  double low = 0, high = 1, gap = problem_.gaps()[contact], slope = -gap;
   for (int i = 0; i < kStallIterations && (high - low) * span > kCommandResolution; ++i) {
     const double width = high - low, part = std::clamp(low - gap / slope, low + 1e-3 * width, high - 1e-3 * width);
-    const bool accepted = try_command(between(start, command, part)) == Move::kAccepted;
-    const double now = remaining_gap(conflict);
-    if (accepted && now >= -tolerance) {
+    if (try_command(between(start, command, part)) == Move::kAccepted) {
       accept();
+      const double now = problem_.gaps()[contact];
       slope = (now - gap) / (part - low);
       low = part;
       gap = now;
-      if (gap <= tolerance) return true;
+      if (gap <= kFeasibility * problem_.robot().max_length) return true;
       if (!(slope < 0)) return false;
     } else {
       high = part;

@@ -139,9 +139,9 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
   // Gaps that no motion satisfies together.
   Conflict meet_conflict(const Command& command);
-  double remaining_gap(const ActiveSet& conflict) const;
+  int widest_gap(const ActiveSet& conflict) const;
   bool can_tighten(const ActiveSet& conflict) const;
-  bool close_gap(const Command& command, const ActiveSet& conflict);
+  bool close_gap(const Command& command, int contact);
   bool raise_tensions(const ActiveSet& conflict);
 
   // The descent after the end of a branch.
