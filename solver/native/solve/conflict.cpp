@@ -24,7 +24,7 @@ ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const
       if (!can_tighten(conflict)) return Conflict::kBlocked;
       return raise_tensions(conflict) ? Conflict::kTight : Conflict::kNone;
     }
-    if (!close_gap(command, open)) break;
+    if (std::isinf(problem_.gaps()[open]) || !close_gap(command, open)) break;  // one out of reach here is not measured
     trial_ = present_;
     trial_.command = command;
     present_evaluated_ = false;
