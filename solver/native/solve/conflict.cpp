@@ -21,7 +21,7 @@ ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const
     evaluate_present();
     const int open = widest_gap(conflict);
     if (problem_.gaps()[open] <= kFeasibility * problem_.robot().max_length) {
-      if (!can_tighten(conflict)) return Conflict::kBlocked;
+      if (!holds_cables(conflict) || std::isinf(problem_.robot().max_tension)) return Conflict::kBlocked;
       return raise_tensions(conflict) ? Conflict::kTight : Conflict::kNone;
     }
     if (std::isinf(problem_.gaps()[open]) || !close_gap(command, open)) break;  // one out of reach here is not measured
@@ -43,13 +43,12 @@ int ModelContinuation<Model>::widest_gap(const ActiveSet& conflict) const {
   return widest;
 }
 
-// Whether tensions of conflicting gaps can rise to a limit.
+// Whether cables are among conflicting gaps.
 template <class Model>
-bool ModelContinuation<Model>::can_tighten(const ActiveSet& conflict) const {
-  bool pulled = false;
+bool ModelContinuation<Model>::holds_cables(const ActiveSet& conflict) const {
   for (int j = 0; j < conflict.count; ++j)
-    pulled |= problem_.is_slack(conflict.contact[j]) && conflict.multiplier[j] > 0;
-  return pulled && std::isfinite(problem_.robot().max_tension);
+    if (problem_.is_slack(conflict.contact[j]) && conflict.multiplier[j] > 0) return true;
+  return false;
 }
 
 // Follows the branch towards a command, which is beyond its end, to where a gap closes, by the secant method.
@@ -109,8 +108,9 @@ bool ModelContinuation<Model>::raise_tensions(const ActiveSet& conflict) {
   return true;
 }
 
-#define CCR_INSTANTIATE(Model) \
-  template ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const Command&);
+#define CCR_INSTANTIATE(Model)                                                                         \
+  template ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const Command&); \
+  template bool ModelContinuation<Model>::holds_cables(const ActiveSet&) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

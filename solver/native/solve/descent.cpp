@@ -92,7 +92,7 @@ bool ModelContinuation<Model>::restore_at(const Command& command, bool holding) 
 template <class Model>
 bool ModelContinuation<Model>::buckle_at(const Command& command) {
   ActiveSet held = newton_.conflict();
-  if (held.count == 0) return false;
+  if (!holds_cables(held)) return false;
   held.count -= 1;  // the slope of the last depends on those of the others
   double size = kDescentCap;
   for (int attempt = 0; attempt < kBucklings; ++attempt, size /= -2) {

@@ -17,9 +17,9 @@ struct ModelContinuation<Model>::Pursuit {
   Command resumed = target;  // where stalled cables were last pulled again
   bool was_resumed = false;  // whether they were
   double step = kLargestStep;
-  double yielding = kYield;       // least displacement of the next yield [a]
-  bool holds = false;             // whether obstacles have pressed the cable to its limit, which is not pulled meanwhile
-  bool refined = false;           // whether the last sub-step was rejected: the next one must not grow at once
+  double yielding = kYield;  // least displacement of the next yield [a]
+  bool holds = false;        // whether obstacles have pressed the cable to its limit, which is not pulled meanwhile
+  bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
   double finest = kSmallestStep;  // sub-step before the branch counts as ended
   Status reached = Status::kConverged;
   bool over = false;  // with `reached`
@@ -234,10 +234,10 @@ bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, d
 }
 
 // A branch that ends within a sub-step from where no descent leads on may go on in finer ones, as where neighbouring
-// contacts wedge the robot and its tension rises steeply. False where it is blocked, or goes on in none.
+// contacts wedge a rod and its tension rises steeply. False where it is blocked, or goes on in none.
 template <class Model>
 bool ModelContinuation<Model>::refine(Pursuit& pursuit, double size, bool blocked) {
-  if (blocked || pursuit.finest <= kTightStep || work_is_spent()) {
+  if (blocked || !Model::kRod || pursuit.finest <= kTightStep || work_is_spent()) {
     pursuit.reached = blocked ? Status::kBlocked : Status::kGaveUp;
     return false;
   }

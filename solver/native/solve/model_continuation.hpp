@@ -140,7 +140,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // Gaps that no motion satisfies together.
   Conflict meet_conflict(const Command& command);
   int widest_gap(const ActiveSet& conflict) const;
-  bool can_tighten(const ActiveSet& conflict) const;
+  bool holds_cables(const ActiveSet& conflict) const;
   bool close_gap(const Command& command, int contact);
   bool raise_tensions(const ActiveSet& conflict);
 
