@@ -234,10 +234,10 @@ bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, d
 }
 
 // A branch that ends within a sub-step from where no descent leads on may go on in finer ones, as where neighbouring
-// contacts wedge a rod and its tension rises steeply. False where it is blocked, or goes on in none.
+// contacts wedge the robot and its tension rises steeply. False where it is blocked, folds over, or goes on in none.
 template <class Model>
 bool ModelContinuation<Model>::refine(Pursuit& pursuit, double size, bool blocked) {
-  if (blocked || !Model::kRod || pursuit.finest <= kTightStep || work_is_spent()) {
+  if (blocked || result_.reason != Reason::kStuck || pursuit.finest <= kTightStep) {
     pursuit.reached = blocked ? Status::kBlocked : Status::kGaveUp;
     return false;
   }
