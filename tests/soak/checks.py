@@ -14,7 +14,7 @@ from solver import Robot, Status
 FAR = 0.5  # of the shortest edge: a step that moves a point farther is checked between its accepted shapes
 CERTIFY_EVERY = 1000
 MOST_FACTORIZATIONS = 5000
-MOST_REPEATED = 10  # cases of an episode whose commands are repeated, which takes long
+MOST_REPEATED = 30  # cases of an episode whose commands are repeated, which takes long
 SAME_PLACE = 1e-4  # of the offset and the robot's length: steps given up on there
 SAME_WAY = 0.1  # distance of unit vectors to their commands: and in this direction are one case
 MOST_BLOCKED = 3  # blocked steps of an episode that are retried in other ways
