@@ -91,6 +91,7 @@ inline constexpr int kOnsetParts = 1 << 20;  // of the way, to one of which it i
 inline constexpr double kTensionBand = 1e-6;
 inline constexpr double kTight = 100.0;      // tension over EI/aL from which sub-steps below kSmallestStep are tried
 inline constexpr double kTightStep = 1e-11;  // the smallest of them [a]
+inline constexpr double kRefining = 1e-2;    // of the sub-step before a branch counts as ended, where nothing leads on
 inline constexpr double kBalance = 1e-5;  // residual of multipliers that balance each other, over the largest of them
 inline constexpr double kPeakStep = 1.25e-3;  // sub-step within which a peak of the tension is ignored [a]
 inline constexpr int kSettling = 3;           // iterations for an equilibrium of cables that pull against each other
@@ -119,6 +120,7 @@ inline constexpr int kDescentShortenings = 4;   // of an iterate that moved fart
 inline constexpr double kProgress = 1e-3;       // least motion of an iterate after its restoration, over that before it
 inline constexpr int kFlat = 8;                 // iterates that lose no energy, after which a saddle is suspected
 inline constexpr int kSofteningRounds = 16;     // of inverse iteration for the direction of least curvature
+inline constexpr int kBucklings = 12;           // bends out of a shape, each half of the last and to the other side
 inline constexpr int kSaddleTries = 10;         // steps along it, each a quarter of the last
 
 }  // namespace ccr::tolerances

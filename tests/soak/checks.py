@@ -14,7 +14,9 @@ from solver import Robot, Status
 FAR = 0.5  # of the shortest edge: a step that moves a point farther is checked between its accepted shapes
 CERTIFY_EVERY = 1000
 MOST_FACTORIZATIONS = 5000
-MOST_GAVE_UP = 10  # steps of an episode given up on that are explained; the rest mostly repeat them
+MOST_REPEATED = 30  # cases of an episode whose commands are repeated, which takes long
+SAME_PLACE = 1e-4  # of the offset and the robot's length: steps given up on there
+SAME_WAY = 0.1  # distance of unit vectors to their commands: and in this direction are one case
 MOST_BLOCKED = 3  # blocked steps of an episode that are retried in other ways
 DEEPEST = 1e-12  # of the robot's length
 INSIDE = 1e-11  # of the robot's length, by the distances in numpy, which round differently
@@ -22,11 +24,12 @@ ROUNDOFF = 1e-12
 BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
 PRETENSION = 0.00625 * 1.001  # of the offset: a cable displaced less is practically slack
+REPEATED = ("far", "pinched", "unexplained")  # reasons that repeats show
 REPEATS = 300  # of a command that was given up on, each of which must come nearer
 PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
 STALLED_AGAIN = 3  # stalled steps of an episode that are repeated
 MOVED_ON = 1e-4  # of the offset: a repeated command that stalled must not lead farther
-BUCKLING = 0.9  # of the tension 6 EI/l0² at which cables that pull against each other bend segments against each other
+BUCKLED = 0.9  # of the tension 12 EI/l0² of all cables, at which segments in line buckle one by one
 UNPULLED = 10  # contact force over the tension: beyond what the cables can cause
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
 
@@ -163,16 +166,35 @@ def _stalled(solver, taken):
 
 def _gave_up(solver, taken, tally):
     """Check that every step given up on has an explanation."""
-    gave_up = np.flatnonzero([state.status == Status.GAVE_UP for state in taken.states[1:]])
-    reasons = [_reason(solver, taken, k) for k in gave_up[:MOST_GAVE_UP]]
-    tally.reasons.update(reasons)
-    tally.reasons["not looked at"] += len(gave_up) - len(reasons)
-    unexplained = gave_up[: len(reasons)][[reason == "unexplained" for reason in reasons]] if reasons else []
-    return [Finding("gave up", k, taken.states[k + 1].factorizations) for k in list(map(int, unexplained))[:1]]
+    cases, unexplained = [], []
+    for k in np.flatnonzero([state.status == Status.GAVE_UP for state in taken.states[1:]]).tolist():
+        case = _case(taken, k)
+        reason = next((why for known, why in cases if _is_same(known, case)), None)
+        if reason is None:
+            spent = sum(why in REPEATED for _, why in cases) >= MOST_REPEATED
+            reason = _reason(solver, taken, k, repeats=0 if spent else REPEATS)
+            cases.append((case, reason))
+        tally.reasons[reason] += 1
+        if reason == "unexplained":
+            unexplained.append(Finding("gave up", k, taken.states[k + 1].factorizations))
+    return unexplained[:1]
 
 
-def _reason(solver, taken, k):
-    """Return why a step was given up on.
+def _case(taken, k):
+    """Return where a step was given up on, in natural units, and the direction to its command."""
+    state, robot = taken.states[k + 1], taken.states[k + 1].robot
+    scale = np.array([*(robot.offset_mm for _ in robot.cables), robot.length_mm])
+    place = np.append(command_of(state) / scale, state.nodes / robot.length_mm)
+    way = (taken.commands[k] - command_of(state)) / scale
+    return place, way / np.linalg.norm(way)
+
+
+def _is_same(case, other):
+    return np.abs(case[0] - other[0]).max() <= SAME_PLACE and np.linalg.norm(case[1] - other[1]) <= SAME_WAY
+
+
+def _reason(solver, taken, k, repeats=REPEATS):
+    """Return why a step was given up on, "not looked at" where that takes repeats and there are to be none.
 
     ``folded``: the branch ends, at once or after repeats, where a segment of the paper's models folds over.
     ``slack``: without pretension the shape of the paper's model is undetermined. ``crossing``: the pulled cable of
@@ -180,8 +202,8 @@ def _reason(solver, taken, k):
     one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
     more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
     draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
-    limit to that. ``unlimited``: no tension limit short of 6 EI/l0² keeps cables that pull against each other from
-    buckling the robot segment by segment.
+    limit to that. ``buckled``: the work of one step is spent while cables, which no limit stops before, pull against
+    each other so much that segments bend to and fro, from pattern to pattern in many small snaps.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = _trace(solver, taken.states[k], command).reason
@@ -194,10 +216,12 @@ def _reason(solver, taken, k):
             return "slack"
     elif robot.model == "paper" and np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
         return "crossing"
-    buckling = 6 * robot.rigidity * (robot.segments / state.length_mm) ** 2
-    if len(robot.cables) > 1 and robot.model == "rod" and robot.max_tension > BUCKLING * buckling:
-        return "unlimited"
-    state = _repeated(solver, state, command)
+    buckling = 12 * robot.rigidity * (robot.segments / state.length_mm) ** 2
+    if robot.model == "rod" and reason == "work" and state.tensions.sum() > BUCKLED * buckling:
+        return "buckled"
+    if repeats == 0:
+        return "not looked at"
+    state = _repeated(solver, state, command, repeats)
     if state.status != Status.GAVE_UP:
         return "far"
     if _trace(solver, state, command).reason == "folded":
@@ -205,9 +229,9 @@ def _reason(solver, taken, k):
     return "pinched" if _is_pinched(state, command) else "unexplained"
 
 
-def _repeated(solver, state, command):
+def _repeated(solver, state, command, repeats):
     """Return where a command leads that is repeated as long as it comes nearer."""
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         before, state = state, step(solver, state, command)
         if state.status != Status.GAVE_UP or not _distance(state, command) < _distance(before, command):
             break

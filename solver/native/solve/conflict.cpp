@@ -11,19 +11,20 @@ namespace ccr {
 using namespace tolerances;
 
 // Follows the branch from `present_` to its end short of a command where gaps conflict, and raises the tensions of the
-// cables among them to the limit. Without a limit, or where there are no cables among them, the robot is blocked.
+// cables among them to the limit. Without a limit, or where there are no cables among them, the robot is blocked unless
+// it buckles.
 template <class Model>
 ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const Command& command) {
   for (int i = 0; Model::kRod && i < kMaxCables; ++i) {  // each closes a gap, which may let others conflict
     const ActiveSet conflict = newton_.conflict();
     if (conflict.count == 0) break;
     evaluate_present();
-    const int newcomer = conflict.contact[conflict.count - 1];
-    if (problem_.gaps()[newcomer] <= kFeasibility * problem_.robot().max_length) {
-      if (!can_tighten(conflict)) return Conflict::kBlocked;
+    const int open = widest_gap(conflict);
+    if (problem_.gaps()[open] <= kFeasibility * problem_.robot().max_length) {
+      if (!holds_cables(conflict) || std::isinf(problem_.robot().max_tension)) return Conflict::kBlocked;
       return raise_tensions(conflict) ? Conflict::kTight : Conflict::kNone;
     }
-    if (!close_gap(command, newcomer)) break;
+    if (std::isinf(problem_.gaps()[open]) || !close_gap(command, open)) break;  // one out of reach here is not measured
     trial_ = present_;
     trial_.command = command;
     present_evaluated_ = false;
@@ -32,13 +33,22 @@ ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const
   return Conflict::kNone;
 }
 
-// Whether tensions of conflicting gaps can rise to a limit.
+// The gap that is open widest among those that conflict: that which was to close last may be closed already.
 template <class Model>
-bool ModelContinuation<Model>::can_tighten(const ActiveSet& conflict) const {
-  bool pulled = false;
+int ModelContinuation<Model>::widest_gap(const ActiveSet& conflict) const {
+  int widest = conflict.contact[conflict.count - 1];
   for (int j = 0; j < conflict.count; ++j)
-    pulled |= problem_.is_slack(conflict.contact[j]) && conflict.multiplier[j] > 0;
-  return pulled && std::isfinite(problem_.robot().max_tension);
+    if (conflict.multiplier[j] > 0 && problem_.gaps()[conflict.contact[j]] > problem_.gaps()[widest])
+      widest = conflict.contact[j];
+  return widest;
+}
+
+// Whether cables are among conflicting gaps.
+template <class Model>
+bool ModelContinuation<Model>::holds_cables(const ActiveSet& conflict) const {
+  for (int j = 0; j < conflict.count; ++j)
+    if (problem_.is_slack(conflict.contact[j]) && conflict.multiplier[j] > 0) return true;
+  return false;
 }
 
 // Follows the branch towards a command, which is beyond its end, to where a gap closes, by the secant method.
@@ -98,8 +108,9 @@ bool ModelContinuation<Model>::raise_tensions(const ActiveSet& conflict) {
   return true;
 }
 
-#define CCR_INSTANTIATE(Model) \
-  template ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const Command&);
+#define CCR_INSTANTIATE(Model)                                                                         \
+  template ModelContinuation<Model>::Conflict ModelContinuation<Model>::meet_conflict(const Command&); \
+  template bool ModelContinuation<Model>::holds_cables(const ActiveSet&) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

@@ -73,7 +73,7 @@ template <class Model>
 bool ModelContinuation<Model>::leave_towards(const Command& command) {
   for (double part = 1; part >= kSmallestPart; part /= 8) {
     const Command nearer = between(present_.command, command, part);
-    if (restore_at(nearer, true) || restore_at(nearer, false)) return true;
+    if (restore_at(nearer, true) || restore_at(nearer, false) || buckle_at(nearer)) return true;
   }
   return false;
 }
@@ -85,6 +85,24 @@ bool ModelContinuation<Model>::restore_at(const Command& command, bool holding) 
   trial_.command = command;
   if (!holding) trial_.active.count = 0;
   return newton_.restore(trial_) && trial_is_close();
+}
+
+// The same where to first order no motion satisfies all gaps, as where cables that pull against each other are too
+// tight for segments in line: bends the robot out of its shape to where some motion does.
+template <class Model>
+bool ModelContinuation<Model>::buckle_at(const Command& command) {
+  ActiveSet held = newton_.conflict();
+  if (!holds_cables(held)) return false;
+  held.count -= 1;  // the slope of the last depends on those of the others
+  double size = kDescentCap;
+  for (int attempt = 0; attempt < kBucklings; ++attempt, size /= -2) {
+    trial_ = present_;
+    trial_.command = command;
+    if (!newton_.bend_softly(trial_, held, size)) return false;
+    trial_.active.count = 0;
+    if (newton_.restore(trial_) && trial_is_close()) return true;
+  }
+  return false;
 }
 
 // One iterate of the descent from `present_` to `trial_`, shortened until nothing is jumped over. True at an

@@ -20,6 +20,7 @@ struct ModelContinuation<Model>::Pursuit {
   double yielding = kYield;  // least displacement of the next yield [a]
   bool holds = false;        // whether obstacles have pressed the cable to its limit, which is not pulled meanwhile
   bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
+  double finest = kSmallestStep;  // sub-step before the branch counts as ended
   Status reached = Status::kConverged;
   bool over = false;  // with `reached`
 };
@@ -190,28 +191,24 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     accept();
     step = pursuit.refined ? size : std::min(2 * size, kLargestStep);
     pursuit.refined = false;
+    if (size >= kSmallestStep) pursuit.finest = kSmallestStep;
   } else if (move == Move::kOverTension) {
     stalled = stalled || approach_tension_limit();
     step = size / 2;
-  } else if (size > kSmallestStep || (size > kTightStep && is_tight() && !is_blocked(next))) {
+  } else if (size > pursuit.finest || (size > kTightStep && is_tight() && !is_blocked(next))) {
     step = size / 2;
     pursuit.refined = true;
-  } else if (const Conflict conflict = meet_conflict(next); conflict != Conflict::kNone) {
-    stalled = conflict == Conflict::kTight;
-    if (!stalled) {
-      pursuit.reached = Status::kBlocked;
-      return false;
-    }
+  } else if (const Conflict conflict = meet_conflict(next); conflict == Conflict::kTight) {
+    stalled = true;
   } else {
     const End end = descend_from_end(next);
     if (end == End::kStuck) {
-      const bool stopped = is_blocked(next) || (moves_obstacles(next) && result_.reason == Reason::kStuck);
-      pursuit.reached = stopped ? Status::kBlocked : Status::kGaveUp;
-      return false;
+      const bool stopped = conflict == Conflict::kBlocked || is_blocked(next);
+      return refine(pursuit, size, stopped || (moves_obstacles(next) && result_.reason == Reason::kStuck));
     }
     stalled = end == End::kOverTension;
     if (end == End::kSnapped) pursuit.reached = std::max(pursuit.reached, Status::kSnapped);
-    step = 2 * kSmallestStep;
+    step = 2 * (pursuit.finest < kSmallestStep ? size : kSmallestStep);
     pursuit.refined = false;
   }
   if (!stalled) return true;
@@ -234,6 +231,21 @@ bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, d
     if (size <= kSmallestStep) pursuit.reached = Status::kBlocked;
   }
   return pursuit.reached != Status::kBlocked;
+}
+
+// A branch that ends within a sub-step from where no descent leads on may go on in finer ones, as where neighbouring
+// contacts wedge the robot and its tension rises steeply. False where it is blocked, folds over, or goes on in none.
+template <class Model>
+bool ModelContinuation<Model>::refine(Pursuit& pursuit, double size, bool blocked) {
+  if (blocked || result_.reason != Reason::kStuck || pursuit.finest <= kTightStep) {
+    pursuit.reached = blocked ? Status::kBlocked : Status::kGaveUp;
+    return false;
+  }
+  pursuit.finest = std::max(pursuit.finest * kRefining, kTightStep);
+  pursuit.step = size / 2;
+  pursuit.refined = true;
+  result_.reason = Reason::kNone;
+  return true;
 }
 
 template <class Model>

@@ -76,6 +76,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool resume(Pursuit& pursuit) const;
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
   bool give_way(Pursuit& pursuit, const Command& next, double size);
+  bool refine(Pursuit& pursuit, double size, bool blocked);
   Command raise_to_pretension(Command wanted) const;
   Move try_command(const Command& command);
   void accept();
@@ -138,7 +139,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
   // Gaps that no motion satisfies together.
   Conflict meet_conflict(const Command& command);
-  bool can_tighten(const ActiveSet& conflict) const;
+  int widest_gap(const ActiveSet& conflict) const;
+  bool holds_cables(const ActiveSet& conflict) const;
   bool close_gap(const Command& command, int contact);
   bool raise_tensions(const ActiveSet& conflict);
 
@@ -148,6 +150,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   End undo_descent(End end);
   bool leave_towards(const Command& command);
   bool restore_at(const Command& command, bool holding);
+  bool buckle_at(const Command& command);
   bool descend_once(bool& moved);
   bool try_newton();
   bool trial_is_close() const;

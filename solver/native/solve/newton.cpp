@@ -246,7 +246,7 @@ bool Newton<Model>::set_metric(const Iterate& at) {
   stretch_ = kStretch;
   creeping_ = false;
   lowest_ = HUGE_VAL;
-  flat_ = 0;
+  flat_ = dropped_ = 0;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
   return factor_convexified(at.active, kDescentPenalties) && factor_metric();
@@ -301,8 +301,8 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
     if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;
   }
   ActiveSet target = at.active;
-  if (!qp_.solve(problem, kkt_, target, step_) &&
-      !(flat && release_lowest(at, target))) {  // not stable without a gap that it drops
+  if (!qp_.solve(problem, kkt_, target, step_) &&  // not stable without a gap that it drops
+      !((flat || ++dropped_ > kFlat) && release_lowest(at, target))) {
     target = at.active;
     if (!kkt_.counts_inertia || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
   }

@@ -60,6 +60,10 @@ class Newton {
   // Moves a shape as little as closes its active gaps and satisfies all others; false where that fails nearby.
   bool restore(Iterate& at);
 
+  // Moves a shape by so much in a direction that keeps some gaps to first order, and in which the metric of `restore`
+  // is nearly least.
+  bool bend_softly(Iterate& at, const ActiveSet& held, double size);
+
   // Factorisations of the KKT system so far, to which the work is nearly proportional.
   std::int64_t factorizations() const { return kkt_.factorizations; }
 
@@ -81,6 +85,7 @@ class Newton {
   double rise_of_roundoff(const ActiveSet& active) const;
   bool has_moved(const Iterate& from, double least) const;
   bool is_flat(const ActiveSet& active);
+  bool find_softest(const ActiveSet& held);
   bool leave_saddle(Iterate& at, double largest);
   double merit(double weight) const;
   double line_search(const Iterate& at, const ActiveSet& target, double& weight);
@@ -97,6 +102,7 @@ class Newton {
   bool creeping_ = false;      // whether the iterates of this descent hardly move
   double lowest_ = 0;          // energy of this descent when it fell last
   int flat_ = 0;               // iterates since then
+  int dropped_ = 0;            // iterates that would not be stable without a gap that they drop
 };
 
 }  // namespace ccr

@@ -43,6 +43,21 @@ bool Newton<Model>::is_flat(const ActiveSet& active) {
   return flat_ >= kFlat;
 }
 
+// Leaves in `step_` the direction of least curvature on the tangent space of some gaps.
+template <class Model>
+bool Newton<Model>::find_softest(const ActiveSet& held) {
+  for (std::size_t i = 0; i < correction_.controls.size(); ++i)
+    for (int k = 0; k < Model::kControl; ++k) correction_.controls[i][k] = 1.0 / (1 + i + k);
+  return qp_.find_softest(problem, kkt_, held, correction_, step_);
+}
+
+template <class Model>
+bool Newton<Model>::bend_softly(Iterate& at, const ActiveSet& held, double size) {
+  if (!problem.evaluate(at) || !find_softest(held)) return false;
+  advance(at, size / step_size(step_), step_, at);
+  return true;
+}
+
 // Moves a stationary shape that is not stable to one of less energy, in the direction of least curvature; false where
 // none is found.
 template <class Model>
@@ -51,9 +66,7 @@ bool Newton<Model>::leave_saddle(Iterate& at, double largest) {
   if (!kkt_.counts_inertia) return false;
   needed_damping_ = 0;
   if (factor_stable(at.active, kDescentPenalties) || !factor_damped(at.active)) return false;
-  for (std::size_t i = 0; i < correction_.controls.size(); ++i)
-    for (int k = 0; k < Model::kControl; ++k) correction_.controls[i][k] = 1.0 / (1 + i + k);
-  if (!qp_.find_softest(problem, kkt_, at.active, correction_, step_) || !factor_metric()) return false;
+  if (!find_softest(at.active) || !factor_metric()) return false;
   const double lower = problem.energy() - rise_of_roundoff(at.active);
   double scale = largest / step_size(step_);
   trial_.command = at.command;
@@ -84,11 +97,13 @@ bool Newton<Model>::release_lowest(Iterate& at, ActiveSet& target) {
   return solved;
 }
 
-#define CCR_INSTANTIATE(Model)                                             \
-  template double Newton<Model>::rise_of_roundoff(const ActiveSet&) const; \
-  template bool Newton<Model>::has_moved(const Iterate&, double) const;    \
-  template bool Newton<Model>::is_flat(const ActiveSet&);                  \
-  template bool Newton<Model>::leave_saddle(Iterate&, double);             \
+#define CCR_INSTANTIATE(Model)                                                  \
+  template double Newton<Model>::rise_of_roundoff(const ActiveSet&) const;      \
+  template bool Newton<Model>::has_moved(const Iterate&, double) const;         \
+  template bool Newton<Model>::is_flat(const ActiveSet&);                       \
+  template bool Newton<Model>::find_softest(const ActiveSet&);                  \
+  template bool Newton<Model>::bend_softly(Iterate&, const ActiveSet&, double); \
+  template bool Newton<Model>::leave_saddle(Iterate&, double);                  \
   template bool Newton<Model>::release_lowest(Iterate&, ActiveSet&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

@@ -31,6 +31,15 @@ def test_nothing_is_found_in_random_episodes(model):
     assert {"CONVERGED", "SNAPPED", "STALLED"} <= set(tally.statuses)
 
 
+def test_every_step_given_up_on_is_looked_at():
+    """One episode of eq. 13 that is given up on at several ends of its branch, most of them again and again."""
+    tally, cases = play(Episode("space", 61, 36, 500))
+    assert cases == []
+    assert tally.statuses["GAVE_UP"] > 50
+    assert tally.reasons.total() == tally.statuses["GAVE_UP"]
+    assert tally.reasons["not looked at"] == 0
+
+
 def test_an_episode_follows_from_its_seed():
     first, again = (play(Episode("paper", 3, 4))[0] for _ in range(2))
     assert first == again

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from soak.episodes import Episode, setting_of
+from soak.walks import sample_increments, walk
 
 from solver import Cable, Scene, Status
 from solver.spatial import SpatialRobot, SpatialSolver
@@ -64,3 +66,11 @@ def test_cables_on_the_edge_of_slack_do_not_keep_others_from_stalling(ends, limi
         assert max(solver.optimality(found)) < 1e-9
     tightened = solver.step(edge, np.where(edge.tensions > 1e-9, edge.cables_mm, edge.cables_mm + 1e-3))
     assert np.abs(tightened.tensions * tightened.slacks_mm).max() < 1e-9
+
+
+def test_a_gap_out_of_reach_among_those_that_conflict_is_not_followed():
+    """It is infinite, and a search for where it closes had a command that is no number."""
+    setting, generator = setting_of(Episode("space rod", 52, 11, 500))
+    increments = sample_increments(generator, setting.solver, setting.scale, 500)
+    states = walk(setting.solver, increments[:16]).states
+    assert max(state.status for state in states) < Status.GAVE_UP

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from soak.cores import CoreCheck
-from soak.episodes import STEPS, Episode, play
+from soak.episodes import STEPS, Episode, play, setting_of
 from soak.report import Tally
+from soak.walks import sample_increments, step, walk
 
-from solver import Scene
+from solver import Scene, Status
 from solver.spatial import Box, Capsule, Cylinder, SpatialRobot, Sphere
 
 SHORT = 2000
@@ -28,6 +29,15 @@ def test_nothing_is_found_in_random_episodes():
     assert tally.contact > SHORT / 10
     assert tally.traced > 0
     assert tally.certified > 0
+
+
+def test_a_step_among_contacts_that_wedge_the_robot_stalls_when_it_is_repeated():
+    """Its tensions double within less than the smallest sub-step, in the course of which no descent leads on."""
+    setting, generator = setting_of(Episode("space", 31, 17, 500))
+    taken = walk(setting.solver, sample_increments(generator, setting.solver, setting.scale, 500)[:474])
+    wedged = taken.states[-1]
+    assert wedged.tensions.max() > 1.5 * taken.states[-2].tensions.max()
+    assert step(setting.solver, wedged, taken.commands[-1]).status is Status.STALLED
 
 
 @pytest.mark.parametrize(
