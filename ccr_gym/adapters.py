@@ -1,14 +1,16 @@
 """Adapters from environments to robots: those of the plane, the same with insertion, and those in space."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import require
-from ccr_gym.quantities import EnvIndex, Quantity, as_scalar
+from ccr_gym.quantities import EnvIndex, Quantity, as_scalar, norm
 from ccr_gym.scales import RADIUS_SPAN
+from ccr_gym.sensing import Body
 from ccr_gym.settings import AnySettings, InsertionSettings, Settings, SpatialSettings
 from solver import BatchSolver, ReferenceBatch, Scene, Solver
 from solver.common.batch import BaseBatch
@@ -42,6 +44,7 @@ class RobotAdapter(ABC, Generic[SettingsT]):
     Attributes:
         settings_class: Settings of the environments.
         space: Dimension d of the space.
+        turns: Numbers that turn a disk, 1 in the plane and 3 in space.
         obstacle_size: How many numbers of an obstacle are observed.
         settings: Settings of the environment.
         actuation: Map from cable actions to cables.
@@ -56,12 +59,19 @@ class RobotAdapter(ABC, Generic[SettingsT]):
 
     settings_class: ClassVar[type[AnySettings]]
     space: ClassVar[int]
+    turns: ClassVar[int]
     obstacle_size: ClassVar[int] = 0
 
     def __init__(self, settings: SettingsT, layout: Layout) -> None:
         self.settings, self.layout = settings, layout
         self.actuation, self.scales = settings.actuation, settings.scales
         self.actions = self._action_spec()
+
+    @property
+    def body(self) -> Body:
+        """Sizes of what is sensed of a robot."""
+        robot = self.settings.robot
+        return Body(self.space, len(robot.cables), robot.segments + 1, self.turns)
 
     @classmethod
     @abstractmethod
@@ -102,6 +112,15 @@ class RobotAdapter(ABC, Generic[SettingsT]):
     @abstractmethod
     def pose_features(self) -> Features:
         """Return the observed features of the shape."""
+
+    @abstractmethod
+    def disturb_pose(self, entries: Mapping[str, np.ndarray], errors: np.ndarray) -> None:
+        """Add errors of a camera or fibre to the observed features of the shape.
+
+        Args:
+            entries: Observed entries, ``(..., k)`` each, written in place.
+            errors: Errors of places and turns of all disks, ``(..., n + 1, d + turns)`` [mm, rad].
+        """
 
     def obstacle_features(self, scene: Scene) -> np.ndarray:
         """Return the observed numbers of the first obstacle, ``(obstacle_size,)``."""
@@ -165,7 +184,7 @@ class RobotAdapter(ABC, Generic[SettingsT]):
 class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
     """A planar robot, with one action for the cables of each section."""
 
-    settings_class, space = Settings, 2
+    settings_class, space, turns = Settings, 2, 1
 
     @classmethod
     def make_batch(cls, settings: PlanarSettingsT, count: int, obstacles: int, threads: int) -> BaseBatch:
@@ -188,8 +207,15 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
         """Return position and disk angle of every node."""
         robot = self.settings.robot
         nodes = self.layout.nodes(np.arange(self.layout.size)).ravel()
-        scale = np.tile(1 / np.array([*2 * [self.settings.reach_mm], np.pi]), robot.segments + 1)
-        return {"nodes": Feature(nodes, scale)}
+        return {"nodes": Feature(nodes, np.tile(self._pose_scale(), robot.segments + 1))}
+
+    def disturb_pose(self, entries: Mapping[str, np.ndarray], errors: np.ndarray) -> None:
+        """Add errors to positions and disk angles; see the base class."""
+        nodes = entries["nodes"]
+        nodes += (errors * self._pose_scale()).reshape(nodes.shape)
+
+    def _pose_scale(self) -> np.ndarray:
+        return 1 / np.array([*2 * [self.settings.reach_mm], np.pi])
 
 
 class InsertionAdapter(PlanarAdapter[InsertionSettings]):
@@ -220,7 +246,7 @@ class InsertionAdapter(PlanarAdapter[InsertionSettings]):
 class SpatialAdapter(RobotAdapter[SpatialSettings]):
     """A robot in space, with two actions for the cables of each section."""
 
-    settings_class, space, obstacle_size = SpatialSettings, 3, 7
+    settings_class, space, turns, obstacle_size = SpatialSettings, 3, 3, 7
 
     @classmethod
     def make_batch(cls, settings: SpatialSettings, count: int, obstacles: int, threads: int) -> BaseBatch:
@@ -244,6 +270,14 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
         axes = np.swapaxes(self.layout.frames(columns)[:, :, [0, 2]], 1, 2).ravel()
         nodes = self.layout.nodes(columns).ravel()
         return {"frames": Feature(axes, 1.0), "nodes": Feature(nodes, 1 / self.settings.reach_mm)}
+
+    def disturb_pose(self, entries: Mapping[str, np.ndarray], errors: np.ndarray) -> None:
+        """Add errors to positions, and turn the axes of the disks by rotation vectors; see the base class."""
+        nodes, frames = entries["nodes"], entries["frames"]
+        nodes += (errors[..., :3] / self.settings.reach_mm).reshape(nodes.shape)
+        axes = frames.reshape(*errors.shape[:-1], 2, 3)
+        turned = axes + np.cross(errors[..., None, 3:], axes)  # to first order, then of unit length again
+        frames[...] = (turned / norm(turned)[..., None]).reshape(frames.shape)
 
     def obstacle_features(self, scene: Scene) -> np.ndarray:
         """Return centre, axis direction and radius of the first obstacle, in units of L, zeros where it has none."""

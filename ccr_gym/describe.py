@@ -9,7 +9,7 @@ from gymnasium import spaces
 from ccr_gym.adapters import AnyAdapter
 from ccr_gym.observation import Observer
 from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SPAN, SUCCESS_ERROR
-from ccr_gym.scales import AHEAD, FORCE_SPAN, RADIUS_SPAN
+from ccr_gym.scales import AHEAD, FORCE_SPAN, RADIUS_SPAN, TENSION_SPAN
 from ccr_gym.settings import AnySettings
 from ccr_gym.task import AnyTask
 from ccr_gym.tasks import LEVELS
@@ -122,6 +122,7 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
     """Return meaning and scale of an entry of the observation."""
     robot, force = settings.robot, f"{FORCE_SPAN * settings.scales.force_n:.3g} N"
     planar, space = isinstance(robot, Robot), task.adapter.space
+    tension = f"{TENSION_SPAN * settings.scales.tension_n:.3g} N"
     radius = RADIUS_SPAN * settings.scales.length_mm
     lines = ", ".join(robot.touch) if planar else "backbone, first and second hole, opposite holes"
     length = f"{max(robot.lengths_mm) if isinstance(robot, Robot) else robot.length_mm:g} mm"
@@ -141,6 +142,7 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
             if planar
             else ("x, y, z of nodes 0…n, node by node", length)
         ),
+        "tension": ("tension of each cable, as a load cell at its motor reads it", tension),
         "obstacle": (
             "centre x, y, z; axis of a cylinder, else 0; radius",
             f"{length}, 1, {radius:g} mm",

@@ -43,8 +43,9 @@ class EpisodeBatch(Transition):
         """Return the present contact forces."""
         blocks, estimator = self.batch.blocks[index], self._estimator
         nominal = self.adapter.force(blocks, self._target)
+        known = nominal if self._sensors is None else self.adapter.force(self.model.blocks[index], self._target)
         chosen, paper = (
-            np.asarray(factors[index])[..., None] * nominal for factors in (estimator.chosen, estimator.paper)
+            np.asarray(factors[index])[..., None] * known for factors in (estimator.chosen, estimator.paper)
         )
         ratio = 1.0 if self._sensors is None else np.asarray(self._sensors.rigidity_ratio[index])[..., None]
         force_true = ratio * nominal
@@ -74,12 +75,14 @@ class EpisodeBatch(Transition):
         if self._settings.regulate == "estimate":
             inputs["force_measured"] = measured
         if self._sensors is not None:
-            measured = inputs["force_measured"] = measured + self._sensors.force_error(self._time, index)
+            measured = inputs["force_measured"] = self._sensors.measured_force(measured, self._time, index)
             force = as_scalar(norm(measured), index)
         inputs["force_error"] = reading.goal - (measured if self._vector else force)
         constants = {"obstacle": self._obstacle_features[index], "robot": self._robot_features[index]}
         rows = self.observer.rows(reading.blocks, inputs, constants)
         if self._sensors is not None:
+            contact, errors = self._layout.flags(self.model.blocks[index]), self._sensors.pose_errors(self._time, index)
+            self.observer.write_sensed(rows, contact, self._tensions[index], errors)
             rows = self._sensors.apply_latency(rows, self._time, index)
         self.observer.write_encoders(rows, self._encoders(index))
         return self.observer.clip(rows)

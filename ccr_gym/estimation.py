@@ -25,7 +25,7 @@ from solver.spatial import virtual_work as spatial_virtual_work
 
 DIFFERENCE = 1e-4  # of a command, for slopes [a]
 LEAST_SLOPE = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
-TENSION_NOISE = 0.006  # standard deviation of the tensions that the rigidity is learnt from [EI/(aL)]
+TENSION_NOISE = 0.015  # standard deviation of the tensions that the rigidity is learnt from [EI/(aL)]
 FITTED = 1.0  # largest displacement of the straight lines of Fig. 7 [a]
 STATE = ("chosen", "paper", "_products", "_squares")  # arrays of a ForceEstimator
 TINY = 1e-300  # keeps quotients defined where nothing touches

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from ccr_gym.adapters import AnyAdapter, Feature, Features
 from ccr_gym.quantities import Quantity
 from ccr_gym.randomization import DRAWN_SIZE
-from ccr_gym.scales import AHEAD, FORCE_SPAN
+from ccr_gym.scales import AHEAD, FORCE_SPAN, TENSION_SPAN
 from ccr_gym.sensing import DELAYED_KEYS
 from ccr_gym.task import AnyTask
 
@@ -36,7 +36,7 @@ class Observer:
     def __init__(self, adapter: AnyAdapter, task: AnyTask) -> None:
         features, input_sizes = _features(adapter, task), _input_sizes(adapter, task)
         sizes = {key: feature.columns.size for key, feature in features.items()} | input_sizes
-        keys = [key for key in sorted(sizes) if adapter.settings.force_sensor or key not in SENSOR_KEYS]
+        keys = [key for key in sorted(sizes) if adapter.settings.senses_force or key not in SENSOR_KEYS]
         boxes: dict[str, spaces.Space[np.ndarray]] = {
             key: _box(_lowest(key, sizes[key], adapter), sizes[key]) for key in keys
         }
@@ -59,6 +59,8 @@ class Observer:
         for key in DELAYED_KEYS:
             self.delayed[self._columns.get(key, slice(0))] = True
         self._force_n = FORCE_SPAN * adapter.scales.force_n
+        self._tension_n = TENSION_SPAN * adapter.scales.tension_n
+        self._disturb_pose = adapter.disturb_pose
         most = np.maximum(np.abs(adapter.actions.low_mm), adapter.actions.high_mm)
         self._encoder_scale = 1 / most
 
@@ -92,6 +94,20 @@ class Observer:
                 count = columns.stop - columns.start
                 rows[..., columns] = scaled[..., start : start + count]
                 start += count
+
+    def write_sensed(self, rows: np.ndarray, contact: np.ndarray, tensions: np.ndarray, errors: np.ndarray) -> None:
+        """Write what is known and measured where sensing is not ideal.
+
+        Args:
+            rows: Observations, ``(..., k)``, written in place.
+            contact: Contact flags of the nominal model, ``(..., lines · positions)``.
+            tensions: Measured tensions, ``(..., c)`` [N].
+            errors: Errors of the seen shape, ``(..., n + 1, d + turns)`` [mm, rad].
+        """
+        entries = self.entries(rows)
+        entries["contact"][...] = contact
+        entries["tension"][...] = tensions / self._tension_n
+        self._disturb_pose(entries, errors)
 
     def clip(self, rows: np.ndarray) -> np.ndarray:
         """Return rows within the bounds of the space, as float32; overwrites the rows."""
@@ -135,6 +151,8 @@ def _input_sizes(adapter: AnyAdapter, task: AnyTask) -> dict[str, int]:
         sizes["desired_ahead"] = len(AHEAD)
     if adapter.settings.sensors or adapter.settings.regulate == "estimate":
         sizes["force_measured"] = adapter.space  # with noise or estimated, so not the block's
+    if adapter.settings.sensors:
+        sizes["tension"] = len(adapter.settings.robot.cables)
     if adapter.obstacle_size:
         sizes["obstacle"] = adapter.obstacle_size
     if adapter.settings.randomize and adapter.settings.randomize.observed:

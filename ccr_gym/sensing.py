@@ -1,7 +1,7 @@
-"""The imperfections between robot and agent: motors with backlash, sensors with noise, bias and latency.
+"""The imperfections between robot and agent: motors with backlash, sensors with noise, errors and latency.
 
-Every episode samples its own when it begins, all of its noise included, from the generator of its environment. Sizes
-are multiples of the robot's natural units (:class:`ccr_gym.scales.Scales`).
+Every episode samples its own when it begins, from the generator of its environment. Sizes are multiples of the robot's
+natural units (:class:`ccr_gym.scales.Scales`).
 """
 
 import math
@@ -12,6 +12,7 @@ import numpy as np
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import check_fields, check_range, checked
+from ccr_gym.noise import correlated, draw_start, white
 from ccr_gym.quantities import EnvIndex
 from ccr_gym.scales import Scales
 from ccr_gym.state import Arrays, put, take
@@ -19,92 +20,195 @@ from solver import Transmission
 from solver.common.validation import SMALLEST
 
 Range = tuple[float, ...]
-DELAYED_KEYS = ("contact", "force_est", "force_error", "force_measured", "frames", "nodes")
+DELAYED_KEYS = ("force_error", "force_measured", "frames", "nodes")  # what a camera and a force sensor tell
+HISTORY = 8  # observations kept, more than the largest latency
+MAX_LOSS = 0.9  # share of the tension that friction takes at most
+DEGREE = math.pi / 180
 STATE = (
     "_latency",
     "_backlash_mm",
-    "_noise",
     "_motor_mm",
     "_loss",
     "_moved_in",
+    "_tension_noise",
+    "_tension_zero",
+    "_force_noise",
+    "_force_bias",
+    "_force_resolution",
+    "_pose_noise",
+    "_pose_error",
+    "_start",
     "_history",
     "_history_empty",
     "rigidity_ratio",
 )  # arrays of a SensorModel
-MAX_LOSS = 0.9  # share of the tension that friction takes at most
-HISTORY = 8  # observations kept, more than the largest latency
-NOISE_STEPS = 256  # steps after which the noise of an episode repeats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensing:
-    """Ranges of the imperfections, which every episode samples from.
+    """Ranges of the imperfections, which every episode samples from; ``docs/sensing.md`` has formulas and sources.
 
     Attributes:
-        latency: Delay of all observations but cable displacements and set-point [steps].
-        noise: Standard deviation of white noise on each component of the measured force [EI/L²].
-        bias: Magnitude of the constant error of each component of the measured force [EI/L²].
+        latency: Delay of the shape and of the force sensor [steps].
         backlash: Play between motor and cable: after a reversal the cable rests until it is taken up [a].
-        tendon_loss: Share of the tension that friction takes between motor and robot, against the motion, as in
-            :class:`solver.Transmission`; unknown to the estimator.
         rigidity_ratio: Rigidity of the robot over its nominal value; it scales forces and leaves shapes unchanged.
+        tendon_loss: Share of the tension that friction takes between motor and robot, against the motion, as in
+            :class:`solver.Transmission`.
+        tension_noise: Standard deviation of white noise on the measured tensions [EI/(aL)].
+        tension_zero: Magnitude of the constant error of each measured tension [EI/(aL)].
+        force_noise: Standard deviation of white noise on each component of the measured force [EI/L²].
+        force_bias: Magnitude of the constant error of each component of the measured force [EI/L²].
+        force_resolution: What the measured force is a multiple of, component by component; 0 for no steps [EI/L²].
+        angle_noise: Standard deviation of white noise on the angle of each disk [rad].
+        angle_error: Standard deviation of its constant error, correlated along the robot [rad].
+        place_noise: Standard deviation of white noise on the place of each disk, per axis [L].
+        place_error: Standard deviation of its constant error, correlated along the robot [L].
 
     Raises:
         ValueError: If a range is not two numbers within bounds, the smaller one first.
     """
 
     latency: Range = checked((1, 4), check_range, whole=True, low=0, high=HISTORY - 1)
-    noise: Range = checked((0.01, 0.03), check_range, low=0)
-    bias: Range = checked((0.0, 0.06), check_range, low=0)
     backlash: Range = checked((0.025, 0.075), check_range, low=0)
-    tendon_loss: Range = checked((0.0, 0.3), check_range, low=0, high=MAX_LOSS)
     rigidity_ratio: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
+    tendon_loss: Range = checked((0.0, 0.3), check_range, low=0, high=MAX_LOSS)
+    tension_noise: Range = checked((0.006, 0.015), check_range, low=0)
+    tension_zero: Range = checked((0.0, 0.03), check_range, low=0)
+    force_noise: Range = checked((0.03, 0.1), check_range, low=0)
+    force_bias: Range = checked((0.0, 0.17), check_range, low=0)
+    force_resolution: Range = checked((0.0, 0.06), check_range, low=0)
+    angle_noise: Range = checked((0.6 * DEGREE, 0.6 * DEGREE), check_range, low=0, high=1)
+    angle_error: Range = checked((0.5 * DEGREE, 0.5 * DEGREE), check_range, low=0, high=1)
+    place_noise: Range = checked((0.002, 0.002), check_range, low=0, high=1)
+    place_error: Range = checked((0.002, 0.002), check_range, low=0, high=1)
 
     def __post_init__(self) -> None:
         check_fields(self)
 
 
-EXACT = Sensing(latency=(0, 0), noise=(0, 0), bias=(0, 0), backlash=(0, 0), tendon_loss=(0, 0), rigidity_ratio=(1, 1))
+NONE = (0.0, 0.0)
+EXACT = Sensing(
+    latency=(0, 0),
+    backlash=NONE,
+    rigidity_ratio=(1, 1),
+    tendon_loss=NONE,
+    tension_noise=NONE,
+    tension_zero=NONE,
+    force_noise=NONE,
+    force_bias=NONE,
+    force_resolution=NONE,
+    angle_noise=NONE,
+    angle_error=NONE,
+    place_noise=NONE,
+    place_error=NONE,
+)
+
+
+class Body(NamedTuple):
+    """Sizes of what is sensed of a robot.
+
+    Attributes:
+        space: Dimension d of the space.
+        cables: Number of cables c.
+        nodes: Number of nodes n + 1.
+        turns: Numbers that turn a disk, 1 in the plane and 3 in space.
+    """
+
+    space: int
+    cables: int
+    nodes: int
+    turns: int
 
 
 class Imperfections(NamedTuple):
-    """The imperfections of one episode.
+    """The imperfections of one episode; those of :class:`Sensing`, in the units of the robot.
 
     Attributes:
         latency: Delay [steps].
         backlash_mm: Play between motors and cables [mm].
-        tendon_loss: Share of the tension that is lost.
         rigidity_ratio: Rigidity over its nominal value.
-        force_error_n: Error of the measured force at every step, bias and noise, ``(NOISE_STEPS, d)`` [N].
+        tendon_loss: Share of the tension that is lost.
+        tension_noise: Standard deviation of the measured tensions [N].
+        tension_zero: Constant errors of the measured tensions, ``(c,)`` [N].
+        force_noise: Standard deviation of the measured force [N].
+        force_bias: Constant error of the measured force, ``(d,)`` [N].
+        force_resolution: What the measured force is a multiple of [N].
+        pose_noise: Standard deviations of places and turns of a disk, ``(d + turns,)`` [mm, rad].
+        pose_error: Constant errors of places and turns of all disks, ``(n + 1, d + turns)`` [mm, rad].
+        start: Where the white noise begins.
     """
 
     latency: int
     backlash_mm: float
-    tendon_loss: float
     rigidity_ratio: float
-    force_error_n: np.ndarray
+    tendon_loss: float
+    tension_noise: float
+    tension_zero: np.ndarray
+    force_noise: float
+    force_bias: np.ndarray
+    force_resolution: float
+    pose_noise: np.ndarray
+    pose_error: np.ndarray
+    start: int
 
 
-def sample_imperfections(sensing: Sensing, scales: Scales, space: int, generator: np.random.Generator) -> Imperfections:
+def sample_imperfections(sensing: Sensing, scales: Scales, body: Body, generator: np.random.Generator) -> Imperfections:
     """Return the imperfections of an episode.
 
     Args:
         sensing: Ranges to sample from.
         scales: Natural units of the robot.
-        space: Dimension d of the space.
+        body: Sizes of what is sensed.
         generator: Generator of the environment.
     """
-    latency, backlash, loss, rigidity, noise, *biases = generator.random(5 + space).tolist()
-    low, high = map(int, sensing.latency)
-    bias = [_interpolate(sensing.bias, abs(2 * part - 1)) * math.copysign(1, part - 0.5) for part in biases]
-    white = generator.normal(size=(NOISE_STEPS, space))
-    return Imperfections(
-        low + int(latency * (high - low + 1)),
-        _interpolate(sensing.backlash, backlash) * scales.travel_mm,
-        _interpolate(sensing.tendon_loss, loss),
-        math.exp(_interpolate(tuple(map(math.log, sensing.rigidity_ratio)), rigidity)),
-        (bias + _interpolate(sensing.noise, noise) * white) * scales.force_n,
+    draws, length, tension, force = (
+        _Draws(generator, 11 + body.cables + body.space),
+        scales.length_mm,
+        scales.tension_n,
+        scales.force_n,
     )
+    low, high = map(int, sensing.latency)
+    imperfections = Imperfections(
+        latency=draws.whole(low, high),
+        backlash_mm=draws.between(sensing.backlash) * scales.travel_mm,
+        rigidity_ratio=math.exp(draws.between(tuple(map(math.log, sensing.rigidity_ratio)))),
+        tendon_loss=draws.between(sensing.tendon_loss),
+        tension_noise=draws.between(sensing.tension_noise) * tension,
+        tension_zero=draws.signed(sensing.tension_zero, body.cables) * tension,
+        force_noise=draws.between(sensing.force_noise) * force,
+        force_bias=draws.signed(sensing.force_bias, body.space) * force,
+        force_resolution=draws.between(sensing.force_resolution) * force,
+        pose_noise=_pose_sizes(draws.between(sensing.place_noise) * length, draws.between(sensing.angle_noise), body),
+        pose_error=_pose_sizes(draws.between(sensing.place_error) * length, draws.between(sensing.angle_error), body)
+        * correlated(generator, body.nodes, body.space + body.turns),
+        start=draw_start(generator),
+    )
+    imperfections.pose_error[0] = 0.0  # the base is clamped where everybody knows it
+    return imperfections
+
+
+class _Draws:
+    """Numbers from ranges, all drawn in one call of a generator."""
+
+    def __init__(self, generator: np.random.Generator, count: int) -> None:
+        self._parts = iter(generator.random(count).tolist())
+
+    def whole(self, low: int, high: int) -> int:
+        return low + int(next(self._parts) * (high - low + 1))
+
+    def between(self, ends: Range) -> float:
+        low, high = ends
+        return float(low + next(self._parts) * (high - low))
+
+    def signed(self, ends: Range, count: int) -> np.ndarray:
+        """Return numbers of either sign whose magnitudes are from a range."""
+        sides = np.array([2 * next(self._parts) - 1 for _ in range(count)])
+        return np.asarray(np.copysign(ends[0] + np.abs(sides) * (ends[1] - ends[0]), sides))
+
+
+def _pose_sizes(place_mm: float, angle: float, body: Body) -> np.ndarray:
+    """Return the sizes of the errors of a disk's place and turns, ``(d + turns,)`` [mm, rad]."""
+    return np.array([place_mm] * body.space + [angle] * body.turns)
 
 
 class SensorModel:
@@ -115,20 +219,25 @@ class SensorModel:
 
     Args:
         count: Number N of robots.
-        space: Dimension d of the space.
-        cables: Number of cables.
+        body: Sizes of what is sensed.
         actions: The actuated coordinates.
         delayed: Which columns of an observation are delayed, ``(k,)`` bool.
     """
 
-    def __init__(self, count: int, space: int, cables: int, actions: ActionSpec, delayed: np.ndarray) -> None:
-        self._actions, self._delayed = actions, delayed
+    def __init__(self, count: int, body: Body, actions: ActionSpec, delayed: np.ndarray) -> None:
+        self._actions, self._delayed, self._body = actions, delayed, body
         self._has_backlash = np.arange(actions.size) < actions.commands  # cables have, the insertion has none
         self._latency = np.zeros(count, int)
         self._backlash_mm = np.zeros(count)
-        self._noise = np.zeros((count, NOISE_STEPS, space))
         self._motor_mm = np.zeros((count, actions.size))
-        self._loss, self._moved_in = np.zeros(count), np.ones((count, cables), bool)
+        self._loss, self._moved_in = np.zeros(count), np.ones((count, body.cables), bool)
+        self._tension_noise, self._tension_zero = np.zeros(count), np.zeros((count, body.cables))
+        self._force_noise, self._force_bias = np.zeros(count), np.zeros((count, body.space))
+        self._force_resolution = np.zeros(count)
+        self._pose_noise = np.zeros((count, body.space + body.turns))
+        self._pose_error = np.zeros((count, body.nodes, body.space + body.turns))
+        self._start = np.zeros(count, int)
+        self._white = body.cables + body.space + (body.nodes - 1) * (body.space + body.turns)  # numbers of a step
         self._history = np.zeros((count, HISTORY, delayed.size))
         self._history_empty = np.ones(count, bool)
         self.rigidity_ratio = np.ones(count)
@@ -137,9 +246,12 @@ class SensorModel:
         """Begin a robot's next episode, with the motors at these positions."""
         self._latency[robot], self._backlash_mm[robot] = sampled.latency, sampled.backlash_mm
         self._loss[robot], self.rigidity_ratio[robot] = sampled.tendon_loss, sampled.rigidity_ratio
-        self._noise[robot] = sampled.force_error_n
+        self._tension_noise[robot], self._tension_zero[robot] = sampled.tension_noise, sampled.tension_zero
+        self._force_noise[robot], self._force_bias[robot] = sampled.force_noise, sampled.force_bias
+        self._force_resolution[robot] = sampled.force_resolution
+        self._pose_noise[robot], self._pose_error[robot] = sampled.pose_noise, sampled.pose_error
         self._motor_mm[robot], self._moved_in[robot] = motor_mm, True
-        self._history_empty[robot] = True
+        self._start[robot], self._history_empty[robot] = sampled.start, True
 
     def get_rows(self, robots: list[int]) -> Arrays:
         """Return the state of some robots."""
@@ -184,9 +296,29 @@ class SensorModel:
         """Return how far motors and actuated coordinates can be apart, ``(..., actions)`` [mm]."""
         return np.asarray(np.asarray(self._backlash_mm[index])[..., None] / 2 * self._has_backlash)
 
-    def force_error(self, time: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return the error of the measured force at a step, bias and noise, ``(..., d)`` [N]."""
-        return np.asarray(self._noise[np.arange(len(time))[index], time[index] % NOISE_STEPS])
+    def measured_tensions(self, tensions: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return what load cells at the motors read for nominal tensions in the robot, ``(..., c)`` [N]."""
+        noise = self._noise(time, index, 0, self._body.cables) * self._tension_noise[index][..., None]
+        return np.asarray(self.motor_tensions(tensions, index) + self._tension_zero[index] + noise)
+
+    def measured_force(self, force: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return what the force sensor reads for forces ``(..., d)`` [N]: bias, noise, then steps of its resolution."""
+        noise = self._noise(time, index, self._body.cables, self._body.space) * self._force_noise[index][..., None]
+        read, step = force + self._force_bias[index] + noise, self._force_resolution[index][..., None]
+        return np.asarray(np.where(step > 0, np.round(read / np.where(step > 0, step, 1.0)) * step, read))
+
+    def pose_errors(self, time: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return errors of the seen places and turns of all disks, ``(..., n + 1, d + turns)`` [mm, rad]."""
+        errors = self._pose_error[index].copy()
+        moving = errors[..., 1:, :]
+        first = self._body.cables + self._body.space
+        noise = self._noise(time, index, first, self._white - first).reshape(moving.shape)
+        moving += noise * self._pose_noise[index][..., None, :]
+        return np.asarray(errors)
+
+    def _noise(self, time: np.ndarray, index: EnvIndex, first: int, count: int) -> np.ndarray:
+        """Return some of the white noise of a step, of unit variance, ``(..., count)``."""
+        return white(np.asarray(self._start[index] + time[index] * self._white + first), count)
 
     def apply_latency(self, rows: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Return observations whose delayed columns are those of earlier steps, of the first step at the beginning.
@@ -203,8 +335,3 @@ class SensorModel:
         self._history[robots, now % HISTORY] = present
         earlier = self._history[robots, (now - self._latency[robots]) % HISTORY]
         return np.where(self._delayed, earlier, present).reshape(rows.shape)
-
-
-def _interpolate(ends: Range, part: float) -> float:
-    low, high = ends
-    return low + part * (high - low)

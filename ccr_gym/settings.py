@@ -26,6 +26,7 @@ from solver.common.validation import SMALLEST
 from solver.spatial import SpatialRobot
 
 RobotT = TypeVar("RobotT", bound=Robot | SpatialRobot)
+SENSINGS = "ideal", "realistic", "sensorless"
 MAX_FRICTION = 10.0
 INCREMENT = 1 / 16  # cable displacement of a full action [a]
 CABLE_LIMIT = 1.75  # largest cable displacement, of all sections together [a]
@@ -36,17 +37,17 @@ SURROUNDED = tuple(Cable(angle=quarter * math.pi / 2) for quarter in range(4))
 
 
 def check_sensing(name: str, value: object) -> str | Sensing:
-    """Return ``"ideal"``, ``"realistic"`` or a :class:`Sensing`, which may be given as a mapping of its fields.
+    """Return the name of a sensing, or a :class:`Sensing`, which may be given as a mapping of its fields.
 
     Raises:
         TypeError: If it is anything else.
         ValueError: If it is another string, or a field is out of bounds.
     """
-    if isinstance(value, str) and value in ("ideal", "realistic"):
+    if isinstance(value, str) and value in SENSINGS:
         return value
     if not isinstance(value, Sensing | Mapping):
         kind = ValueError if isinstance(value, str) else TypeError
-        raise refusal(name, value, "'ideal', 'realistic' or the fields of a Sensing", kind)
+        raise refusal(name, value, f"{', '.join(map(repr, SENSINGS))} or the fields of a Sensing", kind)
     return check_instance(name, value, kind=Sensing)
 
 
@@ -87,7 +88,8 @@ class BaseSettings(Generic[RobotT]):
         force_limit: Contact force above which ``info["cost"]`` is positive [N]; ``None`` stands for 6 EI/L².
         weights: Weights of the reward terms, or a mapping of names to weights.
         backend: ``"native"``, or ``"casadi"`` for the reference solver, which is slow.
-        sensing: ``"ideal"``, ``"realistic"``, or a :class:`ccr_gym.Sensing` or mapping of its fields.
+        sensing: ``"ideal"``, ``"realistic"``, ``"sensorless"``, the same without a force sensor, or a
+            :class:`ccr_gym.Sensing` or mapping of its fields.
         randomize: A :class:`ccr_gym.Randomization` or mapping of its fields: every episode draws its own robot;
             ``None`` for the same robot in all.
         split: Scenes to sample: ``"train"``, ``"test"``, or ``"all"``; training and test scenes are disjoint.
@@ -149,10 +151,17 @@ class BaseSettings(Generic[RobotT]):
     @property
     def sensors(self) -> Sensing | None:
         """Ranges of the imperfections, or ``None`` where sensing is ideal."""
-        given = Sensing() if self.sensing == "realistic" else self.sensing
-        ranges = given if isinstance(given, Sensing) else None
+        if isinstance(self.sensing, Sensing):
+            ranges: Sensing | None = self.sensing
+        else:
+            ranges = None if self.sensing == "ideal" else Sensing()
         loss = None if self.randomize is None else self.randomize.tendon_loss
         return ranges if loss is None else replace(ranges or EXACT, tendon_loss=loss)
+
+    @property
+    def senses_force(self) -> bool:
+        """Whether there is a force sensor."""
+        return self.force_sensor and self.sensing != "sensorless"
 
     @property
     def reach_mm(self) -> float:

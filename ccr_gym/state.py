@@ -19,6 +19,7 @@ class EpisodeState:
 
     Attributes:
         rows: The robots among their obstacles.
+        model: What is known of them; ``None`` where sensing is ideal.
         starts: Their scenes at the start of the episodes.
         free: Robots of the estimator that nothing touches; ``None`` where it needs none.
         episode: Set-points, time and actions.
@@ -27,6 +28,7 @@ class EpisodeState:
     """
 
     rows: Rows
+    model: Rows | None
     starts: tuple[Scene | None, ...]
     free: Rows | None
     episode: Arrays

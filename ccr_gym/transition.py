@@ -35,6 +35,8 @@ STATE = (
     "_drawn",
     "_robot_features",
     "_time",
+    "_tensions",
+    "_onsets",
 )
 
 
@@ -46,6 +48,8 @@ class Pipeline(NamedTuple):
         adapter: Adapter of the robots.
         observer: Writer of observations.
         estimator: Estimator of the contact forces.
+        model: What is known of the robots: themselves where sensing is ideal, otherwise robots of the nominal rigidity
+            in the known scenes, at what the encoders read.
         sensors: Model of the imperfections; ``None`` where sensing is ideal.
     """
 
@@ -53,6 +57,7 @@ class Pipeline(NamedTuple):
     adapter: AnyAdapter
     observer: Observer
     estimator: ForceEstimator
+    model: BaseBatch
     sensors: SensorModel | None
 
 
@@ -62,6 +67,7 @@ class Transition:
     Attributes:
         count: Number N of robots.
         batch: The robots.
+        model: What is known of them, the same where sensing is ideal.
         adapter: Adapter of the robots.
         observer: Writer of observations.
 
@@ -94,6 +100,8 @@ class Transition:
         self._drawn = np.ones((count, DRAWN_SIZE))  # what the robots are
         self._robot_features = np.zeros((count, DRAWN_SIZE))
         self._time = np.zeros(count, int)  # steps of the episode
+        self._tensions = np.zeros((count, self.batch.cables))  # as the motors see them [N]
+        self._onsets = np.zeros((count, self.batch.cables))  # those before the model's present contact [N]
 
     def _make_pipeline(self, obstacles: int) -> Pipeline:
         settings, count, ranges = self._settings, self.count, self._settings.sensors
@@ -101,9 +109,11 @@ class Transition:
         adapter = self._task.adapter(settings, batch.layout)
         observer = Observer(adapter, self._task)
         estimator = ForceEstimator(adapter, count, self._threads, learns=ranges is not None)
-        space, cables = adapter.space, batch.cables
-        sensors = SensorModel(count, space, cables, adapter.actions, observer.delayed) if ranges else None
-        return Pipeline(batch, adapter, observer, estimator, sensors)
+        if ranges is None:
+            return Pipeline(batch, adapter, observer, estimator, batch, None)
+        model = self._task.adapter.make_batch(settings, count, obstacles, self._threads)
+        sensors = SensorModel(count, adapter.body, adapter.actions, observer.delayed)
+        return Pipeline(batch, adapter, observer, estimator, model, sensors)
 
     def _pipeline_for(self, obstacles: int) -> Pipeline:
         """Return the present pipeline, that of the task, or a new one for another number of obstacles."""
@@ -116,7 +126,7 @@ class Transition:
 
     def _use(self, pipeline: Pipeline) -> None:
         self._pipeline = pipeline
-        self.batch, self.adapter, self.observer, self._estimator, self._sensors = pipeline
+        self.batch, self.adapter, self.observer, self._estimator, self.model, self._sensors = pipeline
         self._layout = self.batch.layout
 
     @property
@@ -145,7 +155,7 @@ class Transition:
         if settings.randomize is not None:
             drawn = settings.randomize.sample(settings.robot, aside)
         if settings.sensors is not None:
-            sampled = sample_imperfections(settings.sensors, settings.scales, self.adapter.space, aside)
+            sampled = sample_imperfections(settings.sensors, settings.scales, self.adapter.body, aside)
         return sampled, drawn
 
     def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
@@ -178,6 +188,10 @@ class Transition:
             self._goal_n[robots] = forces
             self._desired_n[robots] = norm(forces)
         self.batch.rest(robots)
+        if self._sensors is not None:
+            for robot, assignment, own in zip(robots, assignments, drawn, strict=True):
+                self.model.assign(robot, assignment.scene, own.robot)
+            self.model.rest(robots)
         self._estimator.rest(robots, [own.robot for own in drawn])
         self._last_actions[robots], self._time[robots] = 0.0, 0
         self._actuated_mm[robots] = self.adapter.actuated_mm(self.batch.blocks[robots], self._actuated_mm[robots] * 0.0)
@@ -193,6 +207,7 @@ class Transition:
                 self._sensors.begin_episode(robot, sampled, self._actuated_mm[robot])
             if self.adapter.obstacle_size:
                 self._obstacle_features[robot] = self.adapter.obstacle_features(assignment.scene)
+        self._sense(list(robots))
 
     def _note_drawn(
         self, robots: Sequence[int], imperfections: Sequence[Imperfections | None], drawn: Sequence[Drawn]
@@ -227,7 +242,20 @@ class Transition:
         self._actuated_mm[index] = adapter.actuated_mm(blocks, commanded)
         if sensors is not None:
             sensors.move_cables(before, self._layout.cables(blocks), index)
+            adapter.write_command(self.model.commands, sensors.motor_mm(index), index)
+            self.model.move(index)
+        self._sense(index)
         self._estimate(index)
+
+    def _sense(self, index: EnvIndex) -> None:
+        """Read the tensions, and note those of robots of the model that nothing touches."""
+        blocks, tensions = self.model.blocks[index], self._layout.tensions(self.batch.blocks[index])
+        if self._sensors is None:
+            self._tensions[index], self._onsets[index] = tensions, self._layout.onset(blocks)
+            return
+        self._tensions[index] = tensions = self._sensors.measured_tensions(tensions, self._time, index)
+        touching = np.asarray(self._layout.flags(blocks).any(axis=-1))[..., None]
+        self._onsets[index] = np.where(touching, self._onsets[index], tensions)
 
     def _scenes_ahead(self, index: EnvIndex) -> list[Scene] | None:
         """Return where the obstacles of robots are to be after the step, None where they stay."""
@@ -259,18 +287,14 @@ class Transition:
 
     def _estimate(self, index: EnvIndex) -> None:
         """Estimate the forces of robots that have moved."""
-        if not (self._estimator.learns or self._layout.flags(self.batch.blocks[index]).any()):
+        if not (self._estimator.learns or self._layout.flags(self.model.blocks[index]).any()):
             self._estimator.clear(index)  # by far the most frequent case
             return
         robots = np.atleast_1d(np.arange(self.count)[index]).tolist()
-        self._estimator.update(robots, self._measured(self.batch.blocks[robots], self._encoders(robots), robots))
-
-    def _measured(self, blocks: np.ndarray, actuated_mm: np.ndarray, index: EnvIndex) -> Measured:
-        """Return what is measured of robots in equilibria ``(k, size)`` with encoders that read ``(k, actions)``."""
-        tensions, onsets = self._layout.tensions(blocks), self._layout.onset(blocks)
-        if self._sensors is not None:
-            tensions, onsets = (self._sensors.motor_tensions(entry, index) for entry in (tensions, onsets))
-        return Measured(blocks, actuated_mm, tensions, onsets)
+        measured = Measured(
+            self.model.blocks[robots], self._encoders(robots), self._tensions[robots], self._onsets[robots]
+        )
+        self._estimator.update(robots, measured)
 
     def _encoders(self, index: EnvIndex) -> np.ndarray:
         """Return the actuated coordinates that the encoders of the motors read, ``(..., actions)`` [mm]."""
@@ -290,16 +314,28 @@ class Transition:
         blocks = self.batch.probe(commands)
         forces = self.adapter.force(blocks, self._target)
         if self._settings.regulate == "estimate":
-            factors = self._estimator.probe(self._measured(blocks, actuated_mm, ALL))
-            return np.asarray(factors[:, None] * forces)
+            return np.asarray(self._probe_estimate(blocks, commands, actuated_mm)[:, None] * forces)
         return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
+
+    def _probe_estimate(self, blocks: np.ndarray, commands: np.ndarray, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return the factors of the estimate for robots in other equilibria, ``(N,)``."""
+        tensions, onsets = self._layout.tensions(blocks), self._onsets
+        if self._sensors is not None:
+            tensions = self._sensors.measured_tensions(tensions, self._time, ALL)
+            blocks = self.model.probe(commands)
+        else:
+            onsets = self._layout.onset(blocks)
+        return self._estimator.probe(Measured(blocks, actuated_mm, tensions, onsets))
 
     def get_rows(self, robots: list[int]) -> EpisodeState:
         """Return the states of the episodes of some robots."""
         learnt, free = self._estimator.get_rows(robots)
         sensors = {} if self._sensors is None else self._sensors.get_rows(robots)
         starts = tuple(self._starts[robot] for robot in robots)
-        return EpisodeState(self.batch.get_rows(robots), starts, free, take(self, STATE, robots), learnt, sensors)
+        model = None if self._sensors is None else self.model.get_rows(robots)
+        return EpisodeState(
+            self.batch.get_rows(robots), model, starts, free, take(self, STATE, robots), learnt, sensors
+        )
 
     def set_rows(self, robots: list[int], state: EpisodeState) -> None:
         """Put robots into states of :meth:`get_rows`, from which they go on with the same bits.
@@ -315,8 +351,9 @@ class Transition:
         put(self, state.episode, robots)
         for robot, start in zip(robots, state.starts, strict=True):
             self._starts[robot] = start
-        if self._sensors is not None:
+        if self._sensors is not None and state.model is not None:
             self._sensors.set_rows(robots, state.sensors)
+            self.model.set_rows(robots, state.model)
 
     def _check_alike(self, state: EpisodeState) -> None:
         """Raise an error for a state that lacks a part that these episodes have, or has one that they lack."""
