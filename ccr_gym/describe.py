@@ -142,6 +142,11 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
             if planar
             else ("x, y, z of nodes 0…n, node by node", length)
         ),
+        "free_tension": ("tension that the nominal robot needs where nothing touches it, of each command", tension),
+        "lever": (
+            "motion of the points that touch against the force, per command",
+            f"L/a = {settings.scales.length_mm / settings.scales.travel_mm:.3g}",
+        ),
         "tension": ("tension of each cable, as a load cell at its motor reads it", tension),
         "obstacle": (
             "centre x, y, z; axis of a cylinder, else 0; radius",

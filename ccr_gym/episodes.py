@@ -6,7 +6,7 @@ Single and vector environments are both shells around an :class:`EpisodeBatch`, 
 import numpy as np
 
 from ccr_gym.goals import compute_reward
-from ccr_gym.observation import Observation
+from ccr_gym.observation import Known, Observation
 from ccr_gym.quantities import Quantity, as_scalar, norm, operations
 from ccr_gym.readings import ForceReading, PrivilegedState
 from ccr_gym.reward import SUCCESS_ERROR, TERMS, reward_terms
@@ -81,8 +81,10 @@ class EpisodeBatch(Transition):
         constants = {"obstacle": self._obstacle_features[index], "robot": self._robot_features[index]}
         rows = self.observer.rows(reading.blocks, inputs, constants)
         if self._sensors is not None:
-            contact, errors = self._layout.flags(self.model.blocks[index]), self._sensors.pose_errors(self._time, index)
-            self.observer.write_sensed(rows, contact, self._tensions[index], errors)
+            estimator = self._estimator
+            contact, levers = self._layout.flags(self.model.blocks[index]), estimator.levers[index]
+            known = Known(contact, self._tensions[index], estimator.free_forces[index], levers)
+            self.observer.write_sensed(rows, known, self._sensors.pose_errors(self._time, index))
             rows = self._sensors.apply_latency(rows, self._time, index)
         self.observer.write_encoders(rows, self._encoders(index))
         return self.observer.clip(rows)

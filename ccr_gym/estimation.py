@@ -27,7 +27,7 @@ DIFFERENCE = 1e-4  # of a command, for slopes [a]
 LEAST_SLOPE = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
 TENSION_NOISE = 0.015  # standard deviation of the tensions that the rigidity is learnt from [EI/(aL)]
 FITTED = 1.0  # largest displacement of the straight lines of Fig. 7 [a]
-STATE = ("chosen", "paper", "_products", "_squares")  # arrays of a ForceEstimator
+STATE = ("chosen", "paper", "free_forces", "levers", "_products", "_squares")  # arrays of a ForceEstimator
 TINY = 1e-300  # keeps quotients defined where nothing touches
 
 
@@ -140,6 +140,10 @@ class ForceEstimator:
     Attributes:
         chosen: Factors of the estimate that is observed, on the nominal forces, ``(N,)``.
         paper: Factors of the ``paper`` estimate, ``(N,)``.
+        free_forces: Tensions that the nominal robot needs where nothing touches it, as forces on the commands,
+            ``(N, commands)`` [N].
+        levers: By how far the points that touch move against a unit force when a command is pulled by a unit,
+            ``(N, commands)``; 0 where nothing touches.
         learns: Whether the rigidity is unknown, and learnt from robots that nothing touches.
 
     Args:
@@ -153,14 +157,18 @@ class ForceEstimator:
         self._adapter, self.learns = adapter, learns
         self._contact = adapter.settings.estimator == "contact"
         self._tip_known = adapter.layout.tip_slopes.shape != (0,)
-        self._free = FreeRobots(adapter, count, threads) if self._contact or not self._tip_known else None
+        needed = self._contact or not self._tip_known or learns
+        self._free = FreeRobots(adapter, count, threads) if needed else None
         self._slopes = _straight_lines(adapter)
         self._products, self._squares = np.ones(count), np.ones(count)
         self.chosen, self.paper = np.zeros(count), np.zeros(count)
+        commands = adapter.actions.commands
+        self.free_forces, self.levers = np.zeros((count, commands)), np.zeros((count, commands))
 
     def rest(self, robots: Sequence[int], drawn: Sequence[Any]) -> None:
         """Begin new episodes of some robots, which are those that are drawn; ``None`` for the nominal robot."""
-        self.chosen[robots] = self.paper[robots] = 0.0
+        for entry in (self.chosen, self.paper, self.free_forces, self.levers):
+            entry[robots] = 0.0
         prior = RigidityFit.prior()
         self._products[robots], self._squares[robots] = prior.products, prior.squares
         if self._free is not None:
@@ -182,17 +190,20 @@ class ForceEstimator:
 
     def update(self, robots: Sequence[int], measured: Measured) -> None:
         """Estimate anew for some robots that have moved."""
-        indices, learning = np.array(robots, int), self.learns and self._contact
+        indices = np.array(robots, int)
         touching = np.asarray(self._adapter.layout.flags(measured.blocks).any(axis=-1))
-        self.chosen[indices[~touching]] = self.paper[indices[~touching]] = 0.0
-        wanted = touching | learning
+        for entry in (self.chosen, self.paper, self.levers):
+            entry[indices[~touching]] = 0.0
+        wanted = touching | self.learns
         if not wanted.any():
             return
         indices, touching = indices[wanted], touching[wanted]
         measured = Measured(*(entry[wanted] for entry in measured))
         motion = None if self._free is None else self._free.move(indices, measured.actuated_mm)
-        if learning and motion is not None:
+        if self.learns and motion is not None:
             self._learn(indices, measured, motion, touching)
+            self.free_forces[indices] = self._adapter.actuation.forces(motion.tensions)
+            self.levers[indices] = self._works(measured, motion) / np.maximum(self._sizes(measured), TINY)[:, None]
         self.paper[indices] = self._paper_factors(measured, motion)
         self.chosen[indices] = self._chosen_factors(indices, measured, motion)
 
@@ -216,15 +227,23 @@ class ForceEstimator:
     def _contact_factors(self, measured: Measured, motion: FreeMotion, ratio: np.ndarray) -> np.ndarray:
         """Return the factors for which forces do the work at the points that touch that the cables lack, ``(k,)``."""
         adapter, scales = self._adapter, self._adapter.scales
-        forces = adapter.layout.forces(measured.blocks)
-        multipliers = adapter.layout.multipliers(measured.blocks)
-        shares = multipliers / np.maximum(multipliers.sum(axis=(-2, -1), keepdims=True), TINY)
-        pressed = np.sum(shares[..., None] * forces[:, :, None, None], axis=1)
-        works = -np.sum(pressed[:, None] * motion.points, axis=(-3, -2, -1))
+        works = self._works(measured, motion)
         lacking = adapter.actuation.forces(measured.tensions - ratio[:, None] * motion.tensions)
-        least = LEAST_SLOPE * scales.length_mm / scales.travel_mm * np.linalg.norm(forces, axis=-1).sum(axis=-1)
+        least = LEAST_SLOPE * scales.length_mm / scales.travel_mm * self._sizes(measured)
         squares = np.maximum(np.maximum(_dot(works, works), least**2), TINY)
         return np.asarray(np.maximum(_dot(works, lacking), 0.0) / squares)
+
+    def _works(self, measured: Measured, motion: FreeMotion) -> np.ndarray:
+        """Return the work of the model's forces at the points that touch, per command, ``(k, commands)`` [N]."""
+        forces = self._adapter.layout.forces(measured.blocks)
+        multipliers = self._adapter.layout.multipliers(measured.blocks)
+        shares = multipliers / np.maximum(multipliers.sum(axis=(-2, -1), keepdims=True), TINY)
+        pressed = np.sum(shares[..., None] * forces[:, :, None, None], axis=1)
+        return np.asarray(-np.sum(pressed[:, None] * motion.points, axis=(-3, -2, -1)))
+
+    def _sizes(self, measured: Measured) -> np.ndarray:
+        """Return the magnitudes of the model's forces, added over the obstacles, ``(k,)`` [N]."""
+        return np.asarray(np.linalg.norm(self._adapter.layout.forces(measured.blocks), axis=-1).sum(axis=-1))
 
     def _paper_factors(self, measured: Measured, motion: FreeMotion | None) -> np.ndarray:
         """Return the factors for which the forces at the free tip do the work of the loads since onset, ``(k,)``."""

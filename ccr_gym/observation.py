@@ -1,6 +1,7 @@
 """The observation: its entries, their scales and bounds, and its flat form, for one environment or many."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -16,6 +17,22 @@ Observation = np.ndarray | dict[str, np.ndarray]
 SENSOR_KEYS = ("force_error", "force_measured")  # absent without a force sensor
 NOT_NEGATIVE = ("length", "desired_ahead", "contact")
 ENCODER_KEYS = ("cable", "length")  # what the encoders read, in the order of the actions
+
+
+class Known(NamedTuple):
+    """What the nominal model and the load cells at the motors tell of one robot, or of many.
+
+    Attributes:
+        contact: Contact flags of the model, ``(..., lines · positions)``.
+        tensions: Measured tensions, ``(..., c)`` [N].
+        free_forces: As of :class:`ccr_gym.estimation.ForceEstimator`, ``(..., commands)`` [N].
+        levers: Likewise, ``(..., commands)``.
+    """
+
+    contact: np.ndarray
+    tensions: np.ndarray
+    free_forces: np.ndarray
+    levers: np.ndarray
 
 
 class Observer:
@@ -60,6 +77,7 @@ class Observer:
             self.delayed[self._columns.get(key, slice(0))] = True
         self._force_n = FORCE_SPAN * adapter.scales.force_n
         self._tension_n = TENSION_SPAN * adapter.scales.tension_n
+        self._lever_scale = adapter.scales.travel_mm / adapter.scales.length_mm
         self._disturb_pose = adapter.disturb_pose
         most = np.maximum(np.abs(adapter.actions.low_mm), adapter.actions.high_mm)
         self._encoder_scale = 1 / most
@@ -95,18 +113,19 @@ class Observer:
                 rows[..., columns] = scaled[..., start : start + count]
                 start += count
 
-    def write_sensed(self, rows: np.ndarray, contact: np.ndarray, tensions: np.ndarray, errors: np.ndarray) -> None:
+    def write_sensed(self, rows: np.ndarray, known: Known, errors: np.ndarray) -> None:
         """Write what is known and measured where sensing is not ideal.
 
         Args:
             rows: Observations, ``(..., k)``, written in place.
-            contact: Contact flags of the nominal model, ``(..., lines · positions)``.
-            tensions: Measured tensions, ``(..., c)`` [N].
+            known: What the nominal model and the load cells at the motors tell.
             errors: Errors of the seen shape, ``(..., n + 1, d + turns)`` [mm, rad].
         """
         entries = self.entries(rows)
-        entries["contact"][...] = contact
-        entries["tension"][...] = tensions / self._tension_n
+        entries["contact"][...] = known.contact
+        entries["tension"][...] = known.tensions / self._tension_n
+        entries["free_tension"][...] = known.free_forces / self._tension_n
+        entries["lever"][...] = known.levers * self._lever_scale
         self._disturb_pose(entries, errors)
 
     def clip(self, rows: np.ndarray) -> np.ndarray:
@@ -153,6 +172,7 @@ def _input_sizes(adapter: AnyAdapter, task: AnyTask) -> dict[str, int]:
         sizes["force_measured"] = adapter.space  # with noise or estimated, so not the block's
     if adapter.settings.sensors:
         sizes["tension"] = len(adapter.settings.robot.cables)
+        sizes["free_tension"] = sizes["lever"] = adapter.actions.commands
     if adapter.obstacle_size:
         sizes["obstacle"] = adapter.obstacle_size
     if adapter.settings.randomize and adapter.settings.randomize.observed:
