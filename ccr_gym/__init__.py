@@ -23,8 +23,8 @@ from ccr_gym.randomization import Randomization
 from ccr_gym.readings import PrivilegedState
 from ccr_gym.registration import ENV_IDS, register_envs
 from ccr_gym.reward import RewardWeights
-from ccr_gym.scales import AHEAD, FORCE_SPAN, Scales
-from ccr_gym.sensing import Sensing
+from ccr_gym.scales import AHEAD, FORCE_SPAN, TENSION_SPAN, Scales
+from ccr_gym.sensing import EXACT, Sensing
 from ccr_gym.settings import InsertionSettings, Settings, SpatialSettings
 from ccr_gym.task import Assignment, Task
 from ccr_gym.tasks import (
@@ -42,7 +42,9 @@ from ccr_gym.vector_env import ContactVectorEnv, make_vector_env
 __all__ = [
     "AHEAD",
     "ENV_IDS",
+    "EXACT",
     "FORCE_SPAN",
+    "TENSION_SPAN",
     "ActionSpec",
     "Assignment",
     "BracedPush",

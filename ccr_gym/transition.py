@@ -312,20 +312,21 @@ class Transition:
         commands, actuated_mm = self.batch.commands.copy(), self.adapter.bounded(actuated_mm)
         self.adapter.write_command(commands, actuated_mm, ALL)
         blocks = self.batch.probe(commands)
-        forces = self.adapter.force(blocks, self._target)
         if self._settings.regulate == "estimate":
-            return np.asarray(self._probe_estimate(blocks, commands, actuated_mm)[:, None] * forces)
+            return self._probe_estimate(blocks, commands, actuated_mm)
+        forces = self.adapter.force(blocks, self._target)
         return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
 
     def _probe_estimate(self, blocks: np.ndarray, commands: np.ndarray, actuated_mm: np.ndarray) -> np.ndarray:
-        """Return the factors of the estimate for robots in other equilibria, ``(N,)``."""
+        """Return the estimated forces of robots in other equilibria, ``(N, d)`` [N]."""
         tensions, onsets = self._layout.tensions(blocks), self._onsets
         if self._sensors is not None:
             tensions = self._sensors.measured_tensions(tensions, self._time, ALL)
             blocks = self.model.probe(commands)
         else:
             onsets = self._layout.onset(blocks)
-        return self._estimator.probe(Measured(blocks, actuated_mm, tensions, onsets))
+        factors = self._estimator.probe(Measured(blocks, actuated_mm, tensions, onsets))
+        return np.asarray(factors[:, None] * self.adapter.force(blocks, self._target))
 
     def get_rows(self, robots: list[int]) -> EpisodeState:
         """Return the states of the episodes of some robots."""

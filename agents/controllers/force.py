@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.controllers.tare import Tare
-from agents.environment import Environment
+from agents.environment import Environment, require_env
+from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search
 from agents.tuned import P_GAINS, PI_GAINS
 from ccr_gym import FORCE_SPAN
@@ -15,10 +15,10 @@ from ccr_gym import FORCE_SPAN
 class ForceController:
     """Proportional-integral control of the contact force's magnitude, after a search for contact at full speed.
 
-    The mean sensor reading before contact is subtracted. The action is the change of the controller's output (velocity
-    form), so the integral does not wind up at saturation. All cables move in the direction of the search; an insertion
-    stays where it is. A robot of S sections, each of which keeps its bend, is about S² times as stiff: the gains are
-    divided by that.
+    The force is what :class:`agents.estimation.robot.RobotEstimator` knows of it. The action is the change of the
+    controller's output (velocity form), so the integral does not wind up at saturation. All cables move in the
+    direction of the search; an insertion stays where it is. A robot of S sections, each of which keeps its bend, is
+    about S² times as stiff: the gains are divided by that.
 
     Attributes:
         proportional: Action per EI/L² of change in the force error.
@@ -30,7 +30,7 @@ class ForceController:
     integral: float = 0.5
     name: str = "PI"
     _last: float | None = field(default=None, init=False)
-    _tare: Tare = field(default_factory=Tare, init=False)
+    _estimator: RobotEstimator = field(init=False)
 
     @classmethod
     def tuned(cls, env_id: str) -> "ForceController":
@@ -43,17 +43,21 @@ class ForceController:
         return cls(0.0, P_GAINS[env_id], "P")
 
     def reset(self, env: Environment | None = None) -> None:
-        """Forget the last error and the zero of the sensor."""
+        """Forget the last error and what was known of the robot.
+
+        Raises:
+            ValueError: If there is no environment.
+        """
         self._last = None
-        self._tare.reset()
+        self._estimator = RobotEstimator(require_env(env).get_wrapper_attr("settings"), 1)
 
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then control the force."""
-        force = self._tare.force(observation)
-        if force is None:
+        force = float(self._estimator.update_one(observation).force)
+        if not observation["contact"].any():
             self._last = None
             return search(observation)
-        error = FORCE_SPAN * float(np.linalg.norm(observation["desired_force"])) - float(np.linalg.norm(force))
+        error = FORCE_SPAN * float(np.linalg.norm(observation["desired_force"])) - force
         change = 0.0 if self._last is None else error - self._last
         self._last = error
         wanted = (self.proportional * change + self.integral * error) / _sections(observation) ** 2

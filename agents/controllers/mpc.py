@@ -6,9 +6,8 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from agents.controllers.lag import LagEstimator, observed_commands
-from agents.controllers.tare import Tare
 from agents.environment import Environment, require_env
+from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search, set_points
 from agents.tuned import MPCSettings
 
@@ -19,12 +18,11 @@ SMALLEST = 0.006  # change of force that is worth crossing the backlash [EI/L²]
 class PredictiveController:
     """Plans cable moves that follow the previewed set-points, with a force that is linear in the moves.
 
-    Every step solves a quadratic programme (CasADi) and makes its first move. The controller estimates what it needs
-    from its observations and the known geometry of the robot: latency and backlash, and from them the present
-    displacement of the cable (:class:`LagEstimator`); force and slope there, from a curve through the readings so far
-    that weights nearby readings most; and the zero of the force sensor, from the time before contact. All cables move
-    in the direction of the search; an insertion stays where it is. A robot of S sections, each of which keeps its bend,
-    is about S² times as stiff: the sum of its commands counts S² times, so that the same assumptions suit it.
+    Every step solves a quadratic programme (CasADi) and makes its first move. Backlash, present displacement of the
+    cable and present force are what :class:`agents.estimation.robot.RobotEstimator` knows of them; the slope comes
+    from a curve through the forces so far that weights nearby places most. All cables move in the direction of the
+    search; an insertion stays where it is. A robot of S sections, each of which keeps its bend, is about S² times
+    as stiff: the sum of its commands counts S² times, so that the same assumptions suit it.
 
     Attributes:
         settings: Assumptions, and weights of the plan.
@@ -34,8 +32,7 @@ class PredictiveController:
     settings: MPCSettings = field(default_factory=MPCSettings)
     name: str = "MPC"
     _env: Environment = field(init=False)
-    _lag: LagEstimator = field(default_factory=lambda: LagEstimator(1, 1), init=False)
-    _tare: Tare = field(default_factory=Tare, init=False)
+    _estimator: RobotEstimator = field(init=False)
     _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
 
     def reset(self, env: Environment | None = None) -> None:
@@ -44,8 +41,8 @@ class PredictiveController:
         Raises:
             ValueError: If there is no environment.
         """
-        self._env, self._lag = require_env(env), LagEstimator(1, 1)
-        self._tare.reset()
+        self._env = require_env(env)
+        self._estimator = RobotEstimator(self._env.get_wrapper_attr("settings"), 1)
         self._readings.clear()
 
     def act(self, observation: Observation) -> np.ndarray:
@@ -54,17 +51,16 @@ class PredictiveController:
         span, travel = settings.actuation.sections**3, settings.scales.travel_mm
         along = direction[: observation["cable"].size] / float(direction @ direction)
         motor = float(observation["cable"] @ along) * settings.cable_limit_mm / travel
-        observed = float(observed_commands(observation, settings.robot) @ along)
-        self._lag.update(np.array([[motor]]), np.array([[observed]]))
-        measured = self._tare.force(observation)
-        if measured is None:
+        known = self._estimator.update_one(observation)
+        if not observation["contact"].any():
             return direction
-        self._readings.append((span * observed, float(np.linalg.norm(measured))))
+        cable = float(known.cables @ along)
+        self._readings.append((span * cable, float(known.force)))
         increment = span * settings.max_increment_mm / travel
-        move = self._move(span * self._lag.cables.item(), increment, set_points(observation, self.settings.horizon))
+        move = self._move(span * cable, increment, set_points(observation, self.settings.horizon))
         if move == 0:
             return np.zeros_like(direction)
-        play = self._lag.cables.item() + np.copysign(self._lag.half_backlash.item(), move) - motor
+        play = cable + np.copysign(float(known.half_backlash), move) - motor
         action = min(max((move + span * play) / increment, -1.0), 1.0)
         return np.asarray(action * direction, np.float32)
 

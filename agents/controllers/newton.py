@@ -4,27 +4,24 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.controllers.lag import LagEstimator, observed_commands
-from agents.controllers.tare import Tare
 from agents.environment import Environment, require_env
+from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, motor_actions, natural, search, set_points
 from agents.tuned import NEWTON_GAIN
 from ccr_gym import FORCE_SPAN, ActionSpec, PrivilegedState, Scales
 
 PROBE = 1e-4  # trial move of a finite difference [a]
 REACHED = 1e-9  # force error that is roundoff, for which no motor crosses its backlash [EI/L²]
-PRIOR = np.full(2, 4e-5)  # a reading at the resolution of a sensor that agrees with the model [(EI/L²)²]
 
 
 @dataclass(slots=True)
 class NewtonController:
     """Newton steps on the slopes of the contact force in the actuated displacements, from trial moves that are solved.
 
-    It knows the model, the scene and the state of the robot, which policies do not see, but not the rigidity: that it
-    estimates as the ratio of the sensor readings to the model's forces one latency earlier. The zero of the sensor
-    comes from the time before contact; latency and backlash come from the observed shape (:class:`LagEstimator`). The
-    oracle sees all of these, the true force and the next set-point: it is an upper bound, not a competitor. Of several
-    actions it makes the smallest increments that reach the set-point, or come closest to a vector.
+    It knows the model, the scene and the state of the robot, which policies do not see, but neither rigidity nor
+    backlash: these are what :class:`agents.estimation.robot.RobotEstimator` knows of them. The oracle sees all of
+    these, the true force and the next set-point: it is an upper bound, not a competitor. Of several actions it
+    makes the smallest increments that reach the set-point, or come closest to a vector.
 
     Attributes:
         oracle: Whether it sees every hidden quantity.
@@ -39,10 +36,7 @@ class NewtonController:
     name: str = "Newton"
     _env: Environment = field(init=False)
     _actions: ActionSpec = field(init=False)
-    _tare: Tare = field(default_factory=Tare, init=False)
-    _lag: LagEstimator = field(default_factory=lambda: LagEstimator(1, 1), init=False)
-    _modelled: list[float] = field(default_factory=list, init=False)
-    _fit: np.ndarray = field(default_factory=PRIOR.copy, init=False)
+    _estimator: RobotEstimator = field(init=False)
 
     @classmethod
     def knowing(cls) -> "NewtonController":
@@ -55,11 +49,9 @@ class NewtonController:
         Raises:
             ValueError: If there is no environment.
         """
-        self._env, self._fit = require_env(env), PRIOR.copy()
+        self._env = require_env(env)
         self._actions = self._env.get_wrapper_attr("action_spec")
-        self._lag = LagEstimator(1, self._actions.commands)
-        self._tare.reset()
-        self._modelled.clear()
+        self._estimator = RobotEstimator(self._env.get_wrapper_attr("settings"), 1)
 
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then a step to the force of the set-point."""
@@ -96,21 +88,13 @@ class NewtonController:
 
     def _estimated(self, observation: Observation, state: PrivilegedState) -> PrivilegedState:
         """Return the state with every hidden quantity replaced by its estimate."""
-        force, cables = state.force / state.rigidity_ratio, observation["cable"].size  # the force of the nominal model
+        known, cables = self._estimator.update_one(observation), observation["cable"].size
         vector = FORCE_SPAN * observation["desired_force"].astype(float)
         goal = vector if vector.size > 1 else set_points(observation, 1).item()
-        observed = observed_commands(observation, self._env.get_wrapper_attr("settings").robot)
-        self._lag.update(state.motor_mm[None, :cables], observed[None])
-        self._modelled.append(float(np.linalg.norm(force)))
-        measured = self._tare.force(observation)
-        if measured is not None:
-            then = self._modelled[max(-1 - self._lag.latency.item(), -len(self._modelled))]
-            self._fit = self._fit + then * np.array([np.linalg.norm(measured), then])
-        ratio = self._fit[0] / self._fit[1]
-        slack = np.where(
-            np.arange(state.half_backlash_mm.size) < cables, self._lag.half_backlash, 0.0
-        )  # an insertion has none
-        return PrivilegedState(ratio * force, ratio, goal, state.actuated_mm, state.motor_mm, slack)
+        ratio = float(known.rigidity)
+        force = ratio / state.rigidity_ratio * state.force  # from the nominal model's
+        slack = np.where(np.arange(state.half_backlash_mm.size) < cables, known.half_backlash, 0.0)  # insertion: none
+        return PrivilegedState(force, ratio, goal, state.actuated_mm, state.motor_mm, slack)
 
     def _slopes(self, actuated: np.ndarray, scales: Scales, size: float) -> np.ndarray:
         """Return the slopes of the regulated force in the actuated displacements, ``(actions, d)`` [EI/L² per a].
@@ -122,4 +106,4 @@ class NewtonController:
         steps = np.where(actuated + PROBE > high, -PROBE, PROBE)
         here = probe(actuated * scales.travel_mm)
         there = np.array([probe(places * scales.travel_mm) for places in actuated + np.diag(steps)])
-        return np.asarray((there - here) / steps[:, None] * (size / float(np.linalg.norm(here))))
+        return np.asarray((there - here) / steps[:, None] * (size / max(float(np.linalg.norm(here)), REACHED)))

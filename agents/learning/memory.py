@@ -1,9 +1,8 @@
 """What a learned policy remembers of an episode, besides its present observation.
 
-Latency and backlash hide the present state, and the bias of the force sensor shows only before contact, so a single
-observation is not enough. The memory is small and fixed: the zero of the force sensor, the ratio of its readings to the
-virtual-work estimate (which has no noise), past force errors at four time scales, the last moves, and the latency and
-backlash that explain the observed displacements of the cables.
+Latency and backlash hide the present state, and friction, rigidity and zeros of the sensors show only over time, so a
+single observation is not enough. The memory is small and fixed: what is known of the robot and its contact force
+(:class:`agents.estimation.robot.RobotEstimator`), past force errors at four time scales, and the last moves.
 """
 
 from collections.abc import Mapping
@@ -13,17 +12,17 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from agents.controllers.lag import ALL, LagEstimator, observed_commands
 from agents.environment import EnvIndex
+from agents.estimation.candidates import ALL
+from agents.estimation.robot import Knowledge, RobotEstimator
 from ccr_gym import FORCE_SPAN, Settings, SpatialSettings
 
 DECAYS = (0.0, 0.5, 0.8, 0.95)  # of the averages of past errors, per step
-TINY = 1e-9
-RATIO_DECAY = 0.97  # per step, of the readings that the ratio of sensor and estimate is fitted to
 MOVES = 6  # remembered moves of the motors
 FINE = 0.01  # force error that the logarithmic scale resolves [EI/L²]
 MOVE_SCALE = 28.0  # full increments in the range of a cable
 MOVED = ("cable", "length")
+KNOWN = ("latency", "half_backlash", "loss", "rigidity", "rigidity_std", "force", "force_std")
 
 
 class Memory:
@@ -41,26 +40,19 @@ class Memory:
     def __init__(self, space: spaces.Dict, count: int, settings: Settings | SpatialSettings) -> None:
         sizes = {key: box.shape[0] for key, box in space.items() if box.shape}
         self._moved = [key for key in MOVED if key in sizes]
-        moved, goal = sum(sizes[key] for key in self._moved), sizes["desired_force"]
-        self._zero = np.zeros((count, sizes["force_measured"]))  # mean reading before contact
-        self._readings = np.zeros((count, 1))  # number of these readings
-        self._fit = np.zeros((count, 2))  # sums of reading × estimate and of estimate²
-        self._errors = np.zeros((count, len(DECAYS), 2 * goal))
+        moved = sum(sizes[key] for key in self._moved)
+        self._errors = np.zeros((count, len(DECAYS)))
         self._moves = np.zeros((count, MOVES, moved))
         self._motors = np.full((count, moved), np.nan)
-        self._robot, self._range = settings.robot, settings.cable_limit_mm / settings.scales.travel_mm
-        self._lag = LagEstimator(count, sizes["cable"])
-        remembered = (
-            sizes["force_measured"] + 1 + goal + len(DECAYS) * 2 * goal + MOVES * moved + 2 + 2 * sizes["cable"]
-        )
-        self.size = sum(sizes.values()) + remembered
+        self._estimator = RobotEstimator(settings, count)
+        self._range = settings.cable_limit_mm / settings.scales.travel_mm
+        self.size = sum(sizes.values()) + len(KNOWN) + sizes["cable"] + len(DECAYS) + MOVES * moved
 
     def reset(self, index: EnvIndex = ALL) -> None:
         """Start new episodes."""
-        for part in (self._zero, self._readings, self._fit, self._errors, self._moves):
-            part[index] = 0.0
+        self._errors[index] = self._moves[index] = 0.0
         self._motors[index] = np.nan
-        self._lag.reset(index)
+        self._estimator.reset(index)
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> np.ndarray:
         """Take in the next observations of some episodes; return them with their memory, ``(k, size)`` float32.
@@ -69,38 +61,20 @@ class Memory:
             observation: Arrays ``(k, ...)``, one row per episode.
             index: The episodes.
         """
-        force = self._update_force(observation, index)
-        moves = self._update_moves(observation, index)
-        lag = self._update_lag(observation, index)
-        return np.concatenate([*observation.values(), *force, moves, *lag], axis=1).astype(np.float32)
+        known = self._estimator.update(observation, index)
+        numbers = np.stack([getattr(known, name) for name in KNOWN], axis=1)
+        behind = known.cables - self._range * observation["cable"].astype(float)
+        errors, moves = self._update_errors(observation, known, index), self._update_moves(observation, index)
+        return np.concatenate([*observation.values(), numbers, behind, errors, moves], axis=1).astype(np.float32)
 
-    def _update_force(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> tuple[np.ndarray, ...]:
-        """Return the zero of the sensor, its ratio to the estimate, the scaled estimate and past errors."""
-        touching = observation["contact"].any(axis=1, keepdims=True)
-        measured, estimate = (observation[key].astype(float) for key in ("force_measured", "force_est"))
-        desired = observation["desired_force"].astype(float)
-        readings, zero = self._readings[index] + ~touching, self._zero[index]
-        zero = zero + np.where(touching, 0.0, (measured - zero) / np.maximum(readings, 1.0))
-        reading = np.where(touching, measured - zero, 0.0)
-        fit = RATIO_DECAY * self._fit[index] + np.stack(
-            [_size(reading) * _size(estimate), _size(estimate) ** 2], axis=1
-        )
-        ratio = fit[:, :1] / np.maximum(fit[:, 1:], TINY)
-        force = ratio * estimate
-        if desired.shape[1] == 1:  # the set-point is a magnitude
-            reading, force = _size(reading)[:, None], _size(force)[:, None]
-        self._zero[index], self._readings[index], self._fit[index] = zero, readings, fit
-        errors = self._averaged(np.concatenate([desired - reading, desired - force], axis=1), index)
-        return zero, ratio, force, errors.reshape(len(errors), -1)
-
-    def _averaged(self, missing: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return decaying averages of the force errors on a logarithmic scale, ``(k, decays, ...)``."""
-        missing = FORCE_SPAN * missing
+    def _update_errors(self, observation: Mapping[str, np.ndarray], known: Knowledge, index: EnvIndex) -> np.ndarray:
+        """Return decaying averages of the force errors on a logarithmic scale, ``(k, decays)``."""
+        missing = FORCE_SPAN * np.linalg.norm(observation["desired_force"].astype(float), axis=1) - known.force
         missing = np.copysign(np.log1p(np.abs(missing) / FINE), missing)
         errors = self._errors[index]
-        errors = errors + (1 - np.array(DECAYS)[:, None]) * (missing[:, None] - errors)
+        errors = errors + (1 - np.array(DECAYS)) * (missing[:, None] - errors)
         self._errors[index] = errors
-        return errors
+        return np.asarray(errors)
 
     def _update_moves(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
         """Return the last moves of the motors, ``(k, MOVES · moved)``."""
@@ -109,18 +83,6 @@ class Memory:
         moves = np.concatenate([MOVE_SCALE * (motors - before)[:, None], self._moves[index][:, :-1]], axis=1)
         self._motors[index], self._moves[index] = motors, moves
         return moves.reshape(len(moves), -1)
-
-    def _update_lag(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> tuple[np.ndarray, ...]:
-        """Return latency, half backlash, and the present cables relative to the observed ones and to the motors."""
-        motors, lag = self._range * observation["cable"].astype(float), self._lag
-        lag.update(motors, observed_commands(observation, self._robot), index)
-        cables, observed = lag.cables[index], lag.observed[index]
-        return lag.latency[index][:, None], lag.half_backlash[index][:, None], cables - observed, cables - motors
-
-
-def _size(vectors: np.ndarray) -> np.ndarray:
-    """Return the magnitudes ``(k,)`` of vectors ``(k, d)``."""
-    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 class MemoryVecEnv(VecEnvWrapper):

@@ -1,0 +1,1 @@
+"""What a robot can know of itself and of the force at a contact, from what it observes."""

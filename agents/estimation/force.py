@@ -1,0 +1,96 @@
+"""The contact force from virtual work, corrected by a force sensor whose readings come late."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from agents.environment import EnvIndex
+from ccr_gym import FORCE_SPAN, Sensing
+
+DRIFT = 0.5  # change of the error of virtual work over the change of the force, per step
+LEAST_DRIFT = 0.01  # of such a change [EI/L²]
+
+
+class ForceFilter:
+    """Follows the difference between sensor and virtual work of many robots, as a random walk.
+
+    The zero of the sensor is the mean of its readings before contact.
+
+    Args:
+        count: Number N of robots.
+        sensing: Ranges of the imperfections.
+        latency: Largest delay [steps].
+    """
+
+    def __init__(self, count: int, sensing: Sensing, latency: int) -> None:
+        self._noise = sensing.force_noise[1] ** 2
+        self._steps = 2 * sensing.force_resolution[1] ** 2 / 12  # of the zero as well; it does not average out
+        self._zero, self._readings = np.zeros((count, 3)), np.zeros(count)
+        self._past = np.zeros((count, latency + 1))  # forces of virtual work, the present one first
+        self._shift, self._spread = np.zeros(count), np.full(count, np.inf)
+
+    def reset(self, index: EnvIndex) -> None:
+        """Start new episodes of some robots."""
+        for part in (self._zero, self._readings, self._past, self._shift):
+            part[index] = 0.0
+        self._spread[index] = np.inf
+
+    def update(
+        self,
+        observation: Mapping[str, np.ndarray],
+        force: np.ndarray,
+        variance: np.ndarray,
+        latency: np.ndarray,
+        touching: np.ndarray,
+        index: EnvIndex,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the magnitude of the force and its standard deviation, ``(k,)`` each [EI/L²].
+
+        Args:
+            observation: The next observations.
+            force: Force of virtual work, ``(k,)`` [EI/L²].
+            variance: Its variance, likewise.
+            latency: Delay of the sensor [steps].
+            touching: Whether something touches, ``(k,)`` bool.
+            index: The robots.
+        """
+        if "force_measured" not in observation:
+            return np.where(touching, force, 0.0), np.where(touching, np.sqrt(variance), 0.0)
+        measured = FORCE_SPAN * observation["force_measured"].astype(float)
+        if "tension" not in observation:
+            return np.linalg.norm(measured, axis=1), np.zeros(len(measured))
+        self._past[index] = np.concatenate([force[:, None], self._past[index][:, :-1]], axis=1)
+        past = self._past[index]
+        then = past[np.arange(len(past)), np.rint(latency).astype(int)]
+        self._note_zero(measured, ~touching & ~past.any(axis=1), index)
+        return self._correct(measured, force, variance, then, touching, index)
+
+    def _note_zero(self, measured: np.ndarray, free: np.ndarray, index: EnvIndex) -> None:
+        readings = self._readings[index] + free
+        zero, size = self._zero[index], measured.shape[1]
+        shift = (measured - zero[:, :size]) / np.maximum(readings, 1.0)[:, None]
+        zero[:, :size] += np.where(free[:, None], shift, 0.0)
+        self._zero[index], self._readings[index] = zero, readings
+
+    def _correct(
+        self,
+        measured: np.ndarray,
+        force: np.ndarray,
+        variance: np.ndarray,
+        then: np.ndarray,
+        touching: np.ndarray,
+        index: EnvIndex,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corrected force and its standard deviation."""
+        size = np.linalg.norm(measured - self._zero[index][:, : measured.shape[1]], axis=1)
+        change = self._past[index][:, 0] - self._past[index][:, min(1, self._past.shape[1] - 1)]
+        spread = np.minimum(self._spread[index] + (DRIFT * change) ** 2 + LEAST_DRIFT**2, variance)
+        shift = np.where(np.isinf(self._spread[index]), 0.0, self._shift[index])
+        known = touching & (then > 0)
+        noise = self._noise * (1 + 1 / np.maximum(self._readings[index], 1.0))
+        gain = np.where(known, spread / (spread + noise), 0.0)
+        shift = shift + gain * (size - then - shift)
+        spread = (1 - gain) * spread
+        self._shift[index], self._spread[index] = np.where(touching, shift, 0.0), np.where(touching, spread, np.inf)
+        deviation = np.sqrt(spread + self._steps)
+        return np.where(touching, np.maximum(force + shift, 0.0), 0.0), np.where(touching, deviation, 0.0)

@@ -1,0 +1,132 @@
+"""Rigidity, friction and zero of the tension sensors, from tensions before contact and around reversals.
+
+For each candidate of backlash and friction the tension of a free robot is linear in what is left: ``y = z + r x g``,
+with the rigidity ratio r, a zero z for each command, the tension x of the nominal free robot and ``g = 1/(1 − η)``
+while the cable moves in, ``1 − η`` while it moves out. In contact the tension in the robot is a smooth function of its
+cable, the same in both directions; what breaks that counts against a candidate.
+"""
+
+import numpy as np
+
+from agents.environment import EnvIndex
+from agents.estimation.candidates import Candidates, Loops
+from ccr_gym import Sensing
+
+RIGIDITY = 1.0, 1.0  # mean and standard deviation of the prior of the rigidity ratio
+SMOOTHNESS = 0.9  # weight of the past in the lines through tensions in contact, per step
+SLIP = 0.02  # standard deviation of a tension in contact from such a line, over the tension
+COUNTED = 0.5  # share of the evidence before contact that counts, as the nominal tension is only nearly known
+TRUST = 0.3  # share of that evidence that counts, as errors of neighbouring steps are alike
+LEAST = 1e-3  # of standard deviations, for candidates without noise [EI/(aL)]
+
+
+class TensionFilter:
+    """Beliefs about rigidity, friction and zeros of many robots.
+
+    Args:
+        count: Number N of robots.
+        commands: Number c of commands of a robot.
+        candidates: The candidates.
+        sensing: Ranges of the imperfections.
+
+    Attributes:
+        log_likelihood: Of the candidates of backlash and friction, ``(N, B, E)``.
+        rigidity: Mean of the rigidity ratio for each, ``(N, B, E)``.
+        variance: Its variance, ``(N, B, E)``.
+        zeros: Means of the zeros, ``(N, c, B, E)`` [EI/(aL)].
+    """
+
+    def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing) -> None:
+        self._kept = 1 - candidates.losses
+        self.noise = max(sensing.tension_noise[1], LEAST)
+        zero = max(sensing.tension_zero[1] / np.sqrt(3), LEAST)
+        self._prior = (self.noise / zero) ** 2  # readings that the prior of a zero is worth
+        shape = count, commands, len(candidates.plays), len(candidates.losses)
+        self._sums = np.zeros((5, *shape))  # of 1, x, y, x², x y
+        self._squares = np.zeros(shape[:2])  # of y²
+        self._lines = np.zeros((5, *shape))  # decaying sums in contact of 1, l, t, l², l t
+        self._broken = np.zeros((count, *shape[2:]))  # log-likelihood from contact
+        self._onset = np.full(count, np.inf)  # size of the commands at the first contact [a]
+        self._margin = 2 * float(candidates.plays[-1])
+        self.rigidity, self.variance = np.full((2, count, *shape[2:]), RIGIDITY[0])
+        self.zeros = np.zeros(shape)
+        self.log_likelihood = np.zeros((count, *shape[2:]))
+
+    def reset(self, index: EnvIndex) -> None:
+        """Start new episodes of some robots."""
+        self._sums[:, index] = self._lines[:, index] = 0.0
+        for part in (self._squares, self._broken, self.zeros, self.log_likelihood):
+            part[index] = 0.0
+        self._onset[index] = np.inf
+        self.rigidity[index], self.variance[index] = RIGIDITY[0], RIGIDITY[1] ** 2
+
+    def update(
+        self, tensions: np.ndarray, nominal: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
+    ) -> None:
+        """Take in the tensions of the next step of some robots.
+
+        Args:
+            tensions: What the motors see as forces on the commands, ``(k, c)`` [EI/(aL)].
+            nominal: Tension of the nominal free robot where its cables are, ``(k, c, B)`` [EI/(aL)].
+            loops: Where the cables are.
+            touching: Whether the model says that something touches, ``(k,)`` bool.
+            index: The robots.
+        """
+        places, factors = loops.places[index, 0], self.factors(loops, index)
+        size = np.abs(places).max(axis=(1, 2))
+        self._onset[index] = np.where(touching, np.minimum(self._onset[index], size), self._onset[index])
+        free = ~touching & (size < self._onset[index] - self._margin)
+        self._update_free(tensions, nominal, factors, free, index)
+        self._update_contact(tensions, places, factors, touching, index)
+        self.log_likelihood[index] = self._evidence(index) + self._broken[index]
+
+    def factors(self, loops: Loops, index: EnvIndex) -> np.ndarray:
+        """Return the tension at the motor over that in the robot, ``(k, c, B, E)``."""
+        return np.asarray(np.where(loops.moved_in[index][..., None], 1 / self._kept, self._kept))
+
+    def _update_free(
+        self, tensions: np.ndarray, nominal: np.ndarray, factors: np.ndarray, wanted: np.ndarray, index: EnvIndex
+    ) -> None:
+        x, y = nominal[..., None] * factors, tensions[..., None, None]
+        counted = wanted[:, None, None, None]
+        terms = (np.ones_like(x), x, np.broadcast_to(y, x.shape), x * x, x * y)
+        for total, term in zip(self._sums, terms, strict=True):
+            total[index] += np.where(counted, term, 0.0)
+        self._squares[index] += np.where(wanted[:, None], tensions**2, 0.0)
+
+    def _evidence(self, index: EnvIndex) -> np.ndarray:
+        """Solve for rigidity and zeros of each candidate, and return its log-likelihood, ``(k, B, E)``."""
+        count, sx, sy, sxx, sxy = (total[index] for total in self._sums)
+        weight = 1 / (count + self._prior)  # a zero is taken out of each command
+        cxx, cxy = (sxx - sx * sx * weight).sum(axis=1), (sxy - sx * sy * weight).sum(axis=1)
+        cyy = (self._squares[index][..., None, None] - sy * sy * weight).sum(axis=1)
+        prior = (self.noise / RIGIDITY[1]) ** 2
+        precision = cxx + prior
+        mean = (cxy + prior * RIGIDITY[0]) / precision
+        self.rigidity[index], self.variance[index] = mean, self.noise**2 / precision
+        self.zeros[index] = (sy - mean[:, None] * sx) * weight
+        misfit = cyy + prior * RIGIDITY[0] ** 2 - mean**2 * precision
+        return np.asarray(COUNTED * (-0.5 * misfit / self.noise**2 - 0.5 * np.log(precision)))
+
+    def _update_contact(
+        self, tensions: np.ndarray, places: np.ndarray, factors: np.ndarray, touching: np.ndarray, index: EnvIndex
+    ) -> None:
+        """Compare tensions in the robot with lines through the latest ones, and add them to these."""
+        robot = (tensions[..., None, None] - self.zeros[index]) / factors
+        at = np.broadcast_to(places[..., None], robot.shape)
+        count, sl, st, sll, slt = (total[index] for total in self._lines)
+        spread = sll * count - sl * sl
+        known = touching[:, None, None, None] & (spread > 1e-8 * count * count) & (count > 2)
+        slope = np.where(known, (slt * count - sl * st) / np.where(known, spread, 1.0), 0.0)
+        mean_l, mean_t = (total / np.maximum(count, 1e-9) for total in (sl, st))
+        error = robot - mean_t - slope * (at - mean_l)
+        leverage = np.where(
+            known, 1 / np.maximum(count, 1.0) + (at - mean_l) ** 2 * count / np.where(known, spread, 1.0), 0.0
+        )
+        variance = (self.noise / factors) ** 2 * (1 + leverage) + (SLIP * robot) ** 2
+        broken = np.where(known, -0.5 * error**2 / variance - 0.5 * np.log(variance), 0.0).sum(axis=1)
+        self._broken[index] += TRUST * broken
+        terms = (np.ones_like(robot), at, robot, at * at, at * robot)
+        decay = np.where(touching, SMOOTHNESS, 1.0)[:, None, None, None]
+        for total, term in zip(self._lines, terms, strict=True):
+            total[index] = decay * total[index] + np.where(touching[:, None, None, None], term, 0.0)
