@@ -34,6 +34,8 @@ class PredictiveController:
     _env: Environment = field(init=False)
     _estimator: RobotEstimator = field(init=False)
     _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
+    _steps: list[int] = field(default_factory=list, init=False)  # of the readings
+    _step: int = field(default=0, init=False)
 
     def reset(self, env: Environment | None = None) -> None:
         """Forget the episode and take the robot and the range of its motors from the environment.
@@ -44,6 +46,8 @@ class PredictiveController:
         self._env = require_env(env)
         self._estimator = RobotEstimator(self._env.get_wrapper_attr("settings"), 1)
         self._readings.clear()
+        self._steps.clear()
+        self._step = 0
 
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then the first move of a plan."""
@@ -52,10 +56,12 @@ class PredictiveController:
         along = direction[: observation["cable"].size] / float(direction @ direction)
         motor = float(observation["cable"] @ along) * settings.cable_limit_mm / travel
         known = self._estimator.update_one(observation)
+        self._step += 1
         if not observation["contact"].any():
             return direction
         cable = float(known.cables @ along)
         self._readings.append((span * cable, float(known.force)))
+        self._steps.append(self._step)
         increment = span * settings.max_increment_mm / travel
         move = self._move(span * cable, increment, set_points(observation, self.settings.horizon))
         if move == 0:

@@ -1,0 +1,59 @@
+"""Model-predictive control of the force on an obstacle that moves periodically, as with breath."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.controllers.mpc import SMALLEST, PredictiveController
+
+PERIODS = np.arange(14.0, 57.0, 1.0)  # candidates [steps]
+OVERTONES = 2  # of the motion
+WINDOW = 96  # latest readings that count
+ENOUGH = 20  # readings from which on a period is looked for
+RIDGE = 0.02  # weight of small amplitudes
+
+
+@dataclass(slots=True)
+class HarmonicController(PredictiveController):
+    """Predictive control that also foresees a periodic part of the force.
+
+    The force at a place of the cable is taken to be a line in the place and a Fourier series in time, whose period is
+    the candidate that explains the latest readings best. What the series adds over the horizon is taken off the
+    set-points.
+    """
+
+    name: str = "Harmonic MPC"
+
+    def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:
+        if len(self._readings) < ENOUGH:
+            return PredictiveController._move(self, cable, increment, goals)
+        force, slope, ahead = self._series(cable, len(goals))
+        slope = max(slope, self.settings.least_slope)
+        move = increment * self._plan(slope * increment, force, goals - ahead)
+        return 0.0 if abs(slope * move) < SMALLEST else move
+
+    def _series(self, cable: float, horizon: int) -> tuple[float, float, np.ndarray]:
+        """Return force and slope at a place now, and what the series adds in the next steps, ``(horizon,)``."""
+        cables, forces = np.array(self._readings[-WINDOW:]).T
+        since = np.array(self._steps[-WINDOW:]) - self._step
+        prior = self._curve(cable)[1]
+        best: tuple[float, np.ndarray, float] | None = None
+        for period in PERIODS:
+            columns = np.column_stack([np.ones(len(since)), cables - cable, _waves(since, period)])
+            weights = np.array([0.0, RIDGE, *[RIDGE] * (columns.shape[1] - 2)]) * len(since)
+            target = columns.T @ forces + weights * np.array([0.0, prior, *[0.0] * (columns.shape[1] - 2)])
+            found = np.linalg.solve(columns.T @ columns + np.diag(weights), target)
+            misfit = float(np.sum((columns @ found - forces) ** 2))
+            if best is None or misfit < best[0]:
+                best = misfit, found, period
+        assert best is not None
+        _, (force, slope, *amplitudes), period = best
+        steps = np.arange(horizon + 1)
+        series = _waves(steps, period) @ np.array(amplitudes)
+        return float(force + series[0]), float(slope), series[1:] - series[0]
+
+
+def _waves(steps: np.ndarray, period: float) -> np.ndarray:
+    """Return sines and cosines of a period and its overtones, ``(k, 2 · OVERTONES)``."""
+    phases = 2 * np.pi * np.outer(steps, np.arange(1, OVERTONES + 1)) / period
+    return np.concatenate([np.cos(phases), np.sin(phases)], axis=1)
