@@ -10,7 +10,10 @@ PERIODS = np.arange(14.0, 57.0, 1.0)  # candidates [steps]
 OVERTONES = 2  # of the motion
 WINDOW = 96  # latest readings that count
 ENOUGH = 20  # readings from which on a period is looked for
-RIDGE = 0.02  # weight of small amplitudes
+CYCLES = 1.2  # of a period that must have been seen
+EXPLAINED = 0.5  # largest share of the variance that may be left
+MEMORY = 1.5  # of which past readings fade, in periods
+RIDGE = 0.005  # weight of small amplitudes
 
 
 @dataclass(slots=True)
@@ -25,28 +28,39 @@ class HarmonicController(PredictiveController):
     name: str = "Harmonic MPC"
 
     def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:
-        if len(self._readings) < ENOUGH:
+        series = self._series(cable, len(goals)) if len(self._readings) > ENOUGH else None
+        if series is None:
             return PredictiveController._move(self, cable, increment, goals)
-        force, slope, ahead = self._series(cable, len(goals))
+        force, slope, ahead = series
         slope = max(slope, self.settings.least_slope)
         move = increment * self._plan(slope * increment, force, goals - ahead)
         return 0.0 if abs(slope * move) < SMALLEST else move
 
-    def _series(self, cable: float, horizon: int) -> tuple[float, float, np.ndarray]:
-        """Return force and slope at a place now, and what the series adds in the next steps, ``(horizon,)``."""
+    def _series(self, cable: float, horizon: int) -> tuple[float, float, np.ndarray] | None:
+        """Return force and slope at a place now, and what the series adds in the next steps, ``(horizon,)``.
+
+        None where no series explains much more than the line alone.
+        """
         cables, forces = np.array(self._readings[-WINDOW:]).T
         since = np.array(self._steps[-WINDOW:]) - self._step
         prior = self._curve(cable)[1]
-        best: tuple[float, np.ndarray, float] | None = None
-        for period in PERIODS:
+        best = None
+        for period in PERIODS[PERIODS * CYCLES < -since[0]]:
+            weights = np.exp(since / (MEMORY * period))
             columns = np.column_stack([np.ones(len(since)), cables - cable, _waves(since, period)])
-            weights = np.array([0.0, RIDGE, *[RIDGE] * (columns.shape[1] - 2)]) * len(since)
-            target = columns.T @ forces + weights * np.array([0.0, prior, *[0.0] * (columns.shape[1] - 2)])
-            found = np.linalg.solve(columns.T @ columns + np.diag(weights), target)
-            misfit = float(np.sum((columns @ found - forces) ** 2))
+            ridge = np.array([0.0, RIDGE, *[RIDGE] * (columns.shape[1] - 2)]) * weights.sum()
+            target = columns.T @ (weights * forces) + ridge * np.array([0.0, prior, *[0.0] * (columns.shape[1] - 2)])
+            found = np.linalg.solve(columns.T @ (weights[:, None] * columns) + np.diag(ridge), target)
+            left = forces - columns @ found
+            level = forces - prior * (cables - cable)
+            alone = weights @ (level - weights @ level / weights.sum()) ** 2
+            misfit = float(weights @ left**2 / max(alone, 1e-12))
             if best is None or misfit < best[0]:
                 best = misfit, found, period
-        assert best is not None
+        if best is None or misfit < best[0]:
+                best = misfit, found, period
+        if best is None or best[0] > EXPLAINED:
+            return None
         _, (force, slope, *amplitudes), period = best
         steps = np.arange(horizon + 1)
         series = _waves(steps, period) @ np.array(amplitudes)
