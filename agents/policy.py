@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from agents.environment import Environment, Observation
-from ccr_gym import AHEAD, FORCE_SPAN, PrivilegedState, Scales
+from ccr_gym import AHEAD, PrivilegedState, Scales
 
 __all__ = ["Observation", "Policy", "motor_actions", "natural", "search", "set_points"]
 
@@ -46,14 +46,19 @@ def search(observation: Observation) -> np.ndarray:
     return pull
 
 
-def set_points(observation: Observation, steps: int) -> np.ndarray:
+def set_points(observation: Observation, steps: int, span: float) -> np.ndarray:
     """Return the set-point magnitudes after each of the next steps, ``(steps,)`` [EI/L²].
 
     They are interpolated between the previewed ones; without a preview the present set-point is held.
+
+    Args:
+        observation: The observation of one robot.
+        steps: Number of steps.
+        span: Force that is observed as 1 [EI/L²].
     """
     now = float(np.linalg.norm(observation["desired_force"]))
     ahead = observation.get("desired_ahead", np.full(len(AHEAD), now))
-    return np.asarray(FORCE_SPAN * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
+    return np.asarray(span * np.interp(np.arange(1, steps + 1), (0, *AHEAD), (now, *ahead)))
 
 
 def natural(state: PrivilegedState, scales: Scales) -> PrivilegedState:

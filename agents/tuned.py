@@ -3,31 +3,60 @@
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-PI_GAINS = {  # action per EI/L² of change in the force error; action per EI/L² of force error
-    "CCR/LoadCell-v1": (0.47, 0.35),
-    "CCR/PushObstacle-v1": (0.7, 0.5),
-    "CCR/TrackForce-v1": (0.7, 0.5),
-    "CCR/BracedPush-v1": (0.39, 0.27),
-    "CCR/SoftObstacle-v1": (1.08, 0.86),
-    "CCR/MovingObstacle-v1": (0.7, 0.5),
-    "CCR/InsertAndPush-v1": (0.7, 0.5),
-    "CCR/SpatialPush-v1": (0.7, 0.5),
-    "CCR/LoadCell-Paper-v1": (0.69, 5.5),
-    "CCR/PushObstacle-Paper-v1": (0.08, 1.92),
-    "CCR/SpatialPush-Paper-v1": (0.06, 2.7),
+Gains = dict[str, tuple[float, float]]
+PI_GAINS: dict[str, Gains] = {  # action per EI/L² of change in the force error; action per EI/L² of force error
+    "realistic": {
+        "CCR/LoadCell-v1": (0.2, 0.5),
+        "CCR/PushObstacle-v1": (0.2, 0.5),
+        "CCR/TrackForce-v1": (1.2, 2.0),
+        "CCR/BracedPush-v1": (0.6, 0.5),
+        "CCR/SoftObstacle-v1": (0.8, 1.0),
+        "CCR/MovingObstacle-v1": (0.6, 0.8),
+        "CCR/InsertAndPush-v1": (0.2, 0.8),
+        "CCR/SpatialPush-v1": (0.2, 0.5),
+    },
+    "sensorless": {
+        "CCR/LoadCell-v1": (0.2, 0.5),
+        "CCR/PushObstacle-v1": (0.2, 1.3),
+        "CCR/TrackForce-v1": (0.2, 1.3),
+        "CCR/BracedPush-v1": (0.6, 1.3),
+        "CCR/SoftObstacle-v1": (0.6, 1.3),
+        "CCR/MovingObstacle-v1": (0.6, 1.25),
+        "CCR/InsertAndPush-v1": (1.2, 2.0),
+        "CCR/SpatialPush-v1": (0.6, 1.3),
+    },
+    "ideal": {
+        "CCR/LoadCell-Paper-v1": (0.69, 5.5),
+        "CCR/PushObstacle-Paper-v1": (0.08, 1.92),
+        "CCR/SpatialPush-Paper-v1": (0.06, 2.7),
+    },
 }
-P_GAINS = {  # action per EI/L² of force error
-    "CCR/LoadCell-v1": 0.47,
-    "CCR/PushObstacle-v1": 0.3,
-    "CCR/TrackForce-v1": 0.47,
-    "CCR/BracedPush-v1": 0.28,
-    "CCR/SoftObstacle-v1": 0.59,
-    "CCR/MovingObstacle-v1": 0.3,
-    "CCR/InsertAndPush-v1": 0.3,
-    "CCR/SpatialPush-v1": 0.3,
-    "CCR/LoadCell-Paper-v1": 5.0,
-    "CCR/PushObstacle-Paper-v1": 1.53,
-    "CCR/SpatialPush-Paper-v1": 3.6,
+P_GAINS: dict[str, dict[str, float]] = {  # action per EI/L² of force error
+    "realistic": {
+        "CCR/LoadCell-v1": 0.5,
+        "CCR/PushObstacle-v1": 0.5,
+        "CCR/TrackForce-v1": 2.0,
+        "CCR/BracedPush-v1": 0.5,
+        "CCR/SoftObstacle-v1": 1.0,
+        "CCR/MovingObstacle-v1": 0.8,
+        "CCR/InsertAndPush-v1": 0.8,
+        "CCR/SpatialPush-v1": 0.5,
+    },
+    "sensorless": {
+        "CCR/LoadCell-v1": 0.5,
+        "CCR/PushObstacle-v1": 1.3,
+        "CCR/TrackForce-v1": 1.3,
+        "CCR/BracedPush-v1": 1.3,
+        "CCR/SoftObstacle-v1": 1.3,
+        "CCR/MovingObstacle-v1": 2.0,
+        "CCR/InsertAndPush-v1": 2.0,
+        "CCR/SpatialPush-v1": 1.3,
+    },
+    "ideal": {
+        "CCR/LoadCell-Paper-v1": 5.0,
+        "CCR/PushObstacle-Paper-v1": 1.53,
+        "CCR/SpatialPush-Paper-v1": 3.6,
+    },
 }
 NEWTON_GAIN = 0.8  # share of a Newton step
 
@@ -162,6 +191,12 @@ LearnerSettings = PPOSettings | RecurrentPPOSettings | SACSettings | DistilledSe
 LEARNERS: dict[str, type[LearnerSettings]] = {
     kind.name: kind for kind in (PPOSettings, RecurrentPPOSettings, SACSettings, DistilledSettings)
 }
+
+
+def tuned_for(env_id: str, sensing: str | None) -> str:
+    """Return the sensing for which an environment's controllers are tuned that is nearest to a given one."""
+    usual = sensing_of(env_id)
+    return "sensorless" if (usual, sensing) == ("realistic", "sensorless") else usual
 
 
 def sensing_of(env_id: str) -> Literal["ideal", "realistic"]:

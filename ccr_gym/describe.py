@@ -9,7 +9,7 @@ from gymnasium import spaces
 from ccr_gym.adapters import AnyAdapter
 from ccr_gym.observation import Observer
 from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SPAN, SUCCESS_ERROR
-from ccr_gym.scales import AHEAD, FORCE_SPAN, RADIUS_SPAN, TENSION_SPAN
+from ccr_gym.scales import AHEAD, RADIUS_SPAN, TENSION_SPAN
 from ccr_gym.settings import AnySettings
 from ccr_gym.task import AnyTask
 from ccr_gym.tasks import LEVELS
@@ -120,7 +120,7 @@ def _table(task: AnyTask, adapter: AnyAdapter, settings: AnySettings) -> str:
 
 def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
     """Return meaning and scale of an entry of the observation."""
-    robot, force = settings.robot, f"{FORCE_SPAN * settings.scales.force_n:.3g} N"
+    robot, force = settings.robot, f"{settings.force_span * settings.scales.force_n:.3g} N"
     planar, space = isinstance(robot, Robot), task.adapter.space
     tension = f"{TENSION_SPAN * settings.scales.tension_n:.3g} N"
     radius = RADIUS_SPAN * settings.scales.length_mm

@@ -7,7 +7,7 @@ from gymnasium import spaces
 
 
 def goal_space(flat: spaces.Box, size: int) -> spaces.Dict:
-    """Return the space of goal-conditioned observations, with goals of a size, 1 or d [FORCE_SPAN EI/L²]."""
+    """Return the space of goal-conditioned observations, with goals of a size, 1 or d over the span of forces."""
     goal = spaces.Box(np.full(size, -1.0 if size > 1 else 0.0, np.float32), np.ones(size, np.float32))
     return spaces.Dict({"achieved_goal": goal, "desired_goal": goal, "observation": flat})
 

@@ -9,7 +9,7 @@ from gymnasium import spaces
 from ccr_gym.adapters import AnyAdapter, Feature, Features
 from ccr_gym.quantities import Quantity
 from ccr_gym.randomization import DRAWN_SIZE
-from ccr_gym.scales import AHEAD, FORCE_SPAN, TENSION_SPAN
+from ccr_gym.scales import AHEAD, TENSION_SPAN
 from ccr_gym.sensing import DELAYED_KEYS
 from ccr_gym.task import AnyTask
 
@@ -75,7 +75,7 @@ class Observer:
         self.delayed = np.zeros(self._low.size, bool)
         for key in DELAYED_KEYS:
             self.delayed[self._columns.get(key, slice(0))] = True
-        self._force_n = FORCE_SPAN * adapter.scales.force_n
+        self._force_n = adapter.settings.force_span * adapter.scales.force_n
         self._tension_n = TENSION_SPAN * adapter.scales.tension_n
         self._lever_scale = adapter.scales.travel_mm / adapter.scales.length_mm
         self._disturb_pose = adapter.disturb_pose
@@ -154,7 +154,7 @@ def _features(adapter: AnyAdapter, task: AnyTask) -> Features:
     force = adapter.force(columns, task.target)
     return {
         "contact": Feature(layout.flags(columns), 1.0),
-        "force_measured": Feature(force, 1 / (FORCE_SPAN * adapter.scales.force_n)),
+        "force_measured": Feature(force, 1 / (adapter.settings.force_span * adapter.scales.force_n)),
         **adapter.pose_features(),
     }
 

@@ -10,7 +10,7 @@ from ccr_gym.checks import check_array, check_type, refusal
 from ccr_gym.estimation import ForceEstimator, Measured
 from ccr_gym.quantities import norm
 from ccr_gym.randomization import Drawn
-from ccr_gym.scales import FORCE_SPAN, Scales
+from ccr_gym.scales import Scales
 from ccr_gym.sensing import Imperfections
 from ccr_gym.settings import AnySettings
 from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment, check_force
@@ -125,7 +125,7 @@ class Trials:
         else:
             increment = PULL * self._adapter.scales.travel_mm
             found, reached = self._batch.ramp_reaches_force(robots, wanted, increment, limit, pulls, self._task.target)
-        shown = FORCE_SPAN * self._adapter.scales.force_n
+        shown = self._settings.force_span * self._adapter.scales.force_n
         if not self._task.force_vector:
             return found & (forces <= shown), forces[:, None]
         goals = reached * (ratio / MARGIN)[:, None]

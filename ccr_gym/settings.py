@@ -19,7 +19,7 @@ from ccr_gym.checks import (
 )
 from ccr_gym.randomization import Randomization
 from ccr_gym.reward import RewardWeights
-from ccr_gym.scales import Scales
+from ccr_gym.scales import FORCE_SPAN, Scales
 from ccr_gym.sensing import EXACT, Sensing
 from solver import PRESETS, Actuation, Cable, Robot
 from solver.common.validation import SMALLEST
@@ -157,6 +157,11 @@ class BaseSettings(Generic[RobotT]):
             ranges = None if self.sensing == "ideal" else Sensing()
         loss = None if self.randomize is None else self.randomize.tendon_loss
         return ranges if loss is None else replace(ranges or EXACT, tendon_loss=loss)
+
+    @property
+    def force_span(self) -> float:
+        """Force that is observed as 1 [EI/L²]: S sections, each of which keeps its bend, are S² times as stiff."""
+        return FORCE_SPAN * self.actuation.sections**2
 
     @property
     def senses_force(self) -> bool:

@@ -7,8 +7,7 @@ import numpy as np
 from agents.environment import Environment, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search
-from agents.tuned import P_GAINS, PI_GAINS
-from ccr_gym import FORCE_SPAN
+from agents.tuned import P_GAINS, PI_GAINS, tuned_for
 
 
 @dataclass(slots=True)
@@ -31,16 +30,22 @@ class ForceController:
     name: str = "PI"
     _last: float | None = field(default=None, init=False)
     _estimator: RobotEstimator = field(init=False)
+    _span: float = field(init=False)  # force that is observed as 1 [EI/L²]
 
     @classmethod
-    def tuned(cls, env_id: str) -> "ForceController":
-        """Return the controller with the gains that were best on training scenes with realistic sensing."""
-        return cls(*PI_GAINS[env_id])
+    def tuned(cls, env_id: str, sensing: str | None = None) -> "ForceController":
+        """Return the controller with the gains that were best on training scenes.
+
+        Args:
+            env_id: Id of the environment.
+            sensing: Its sensing; ``None`` for the one that it is usually evaluated with.
+        """
+        return cls(*PI_GAINS[tuned_for(env_id, sensing)][env_id])
 
     @classmethod
-    def proportional_only(cls, env_id: str) -> "ForceController":
-        """Return the tuned controller whose action is proportional to the force error."""
-        return cls(0.0, P_GAINS[env_id], "P")
+    def proportional_only(cls, env_id: str, sensing: str | None = None) -> "ForceController":
+        """Return the tuned controller whose action is proportional to the force error; see :meth:`tuned`."""
+        return cls(0.0, P_GAINS[tuned_for(env_id, sensing)][env_id], "P")
 
     def reset(self, env: Environment | None = None) -> None:
         """Forget the last error and what was known of the robot.
@@ -49,7 +54,8 @@ class ForceController:
             ValueError: If there is no environment.
         """
         self._last = None
-        self._estimator = RobotEstimator(require_env(env).get_wrapper_attr("settings"), 1)
+        settings = require_env(env).get_wrapper_attr("settings")
+        self._estimator, self._span = RobotEstimator(settings, 1), settings.force_span
 
     def act(self, observation: Observation) -> np.ndarray:
         """Return the search action until something touches, then control the force."""
@@ -57,7 +63,7 @@ class ForceController:
         if not observation["contact"].any():
             self._last = None
             return search(observation)
-        error = FORCE_SPAN * float(np.linalg.norm(observation["desired_force"])) - force
+        error = self._span * float(np.linalg.norm(observation["desired_force"])) - force
         change = 0.0 if self._last is None else error - self._last
         self._last = error
         wanted = (self.proportional * change + self.integral * error) / _sections(observation) ** 2

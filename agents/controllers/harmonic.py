@@ -45,7 +45,7 @@ class HarmonicController(PredictiveController):
         since = np.array(self._steps[-WINDOW:]) - self._step
         prior = self._curve(cable)[1]
         best = None
-        for period in PERIODS[PERIODS * CYCLES < -since[0]]:
+        for period in PERIODS[-since[0] > PERIODS * CYCLES]:
             weights = np.exp(since / (MEMORY * period))
             columns = np.column_stack([np.ones(len(since)), cables - cable, _waves(since, period)])
             ridge = np.array([0.0, RIDGE, *[RIDGE] * (columns.shape[1] - 2)]) * weights.sum()
@@ -58,7 +58,7 @@ class HarmonicController(PredictiveController):
             if best is None or misfit < best[0]:
                 best = misfit, found, period
         if best is None or misfit < best[0]:
-                best = misfit, found, period
+            best = misfit, found, period
         if best is None or best[0] > EXPLAINED:
             return None
         _, (force, slope, *amplitudes), period = best

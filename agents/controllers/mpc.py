@@ -63,7 +63,7 @@ class PredictiveController:
         self._readings.append((span * cable, float(known.force)))
         self._steps.append(self._step)
         increment = span * settings.max_increment_mm / travel
-        move = self._move(span * cable, increment, set_points(observation, self.settings.horizon))
+        move = self._move(span * cable, increment, set_points(observation, self.settings.horizon, settings.force_span))
         if move == 0:
             return np.zeros_like(direction)
         play = cable + np.copysign(float(known.half_backlash), move) - motor

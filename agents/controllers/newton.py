@@ -8,7 +8,7 @@ from agents.environment import Environment, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, motor_actions, natural, search, set_points
 from agents.tuned import NEWTON_GAIN
-from ccr_gym import FORCE_SPAN, ActionSpec, PrivilegedState, Scales
+from ccr_gym import ActionSpec, PrivilegedState, Scales
 
 PROBE = 1e-4  # trial move of a finite difference [a]
 REACHED = 1e-9  # force error that is roundoff, for which no motor crosses its backlash [EI/L²]
@@ -89,8 +89,9 @@ class NewtonController:
     def _estimated(self, observation: Observation, state: PrivilegedState) -> PrivilegedState:
         """Return the state with every hidden quantity replaced by its estimate."""
         known, cables = self._estimator.update_one(observation), observation["cable"].size
-        vector = FORCE_SPAN * observation["desired_force"].astype(float)
-        goal = vector if vector.size > 1 else set_points(observation, 1).item()
+        span = self._env.get_wrapper_attr("settings").force_span
+        vector = span * observation["desired_force"].astype(float)
+        goal = vector if vector.size > 1 else set_points(observation, 1, span).item()
         ratio = float(known.rigidity)
         force = ratio / state.rigidity_ratio * state.force  # from the nominal model's
         slack = np.where(np.arange(state.half_backlash_mm.size) < cables, known.half_backlash, 0.0)  # insertion: none

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from agents.environment import EnvIndex
-from ccr_gym import FORCE_SPAN, Sensing
+from ccr_gym import Sensing
 
 DRIFT = 0.5  # change of the error of virtual work over the change of the force, per step
 LEAST_DRIFT = 0.01  # of such a change [EI/L²]
@@ -20,9 +20,11 @@ class ForceFilter:
         count: Number N of robots.
         sensing: Ranges of the imperfections.
         latency: Largest delay [steps].
+        span: Force that is observed as 1 [EI/L²].
     """
 
-    def __init__(self, count: int, sensing: Sensing, latency: int) -> None:
+    def __init__(self, count: int, sensing: Sensing, latency: int, span: float) -> None:
+        self._span = span
         self._noise = sensing.force_noise[1] ** 2
         self._steps = 2 * sensing.force_resolution[1] ** 2 / 12  # of the zero as well; it does not average out
         self._zero, self._readings = np.zeros((count, 3)), np.zeros(count)
@@ -56,7 +58,7 @@ class ForceFilter:
         """
         if "force_measured" not in observation:
             return np.where(touching, force, 0.0), np.where(touching, np.sqrt(variance), 0.0)
-        measured = FORCE_SPAN * observation["force_measured"].astype(float)
+        measured = self._span * observation["force_measured"].astype(float)
         if "tension" not in observation:
             return np.linalg.norm(measured, axis=1), np.zeros(len(measured))
         self._past[index] = np.concatenate([force[:, None], self._past[index][:, :-1]], axis=1)

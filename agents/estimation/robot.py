@@ -67,7 +67,7 @@ class RobotEstimator:
         self._candidates = candidates
         self.loops = Loops(count, commands, candidates)
         self._tension = TensionFilter(count, commands, candidates, sensing)
-        self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]))
+        self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]), settings.force_span)
         self._seen_std = max(SEEN * float(np.mean(sensing.angle_noise)), LEAST_SEEN)
         error = max(SEEN * float(np.mean(sensing.angle_error)), LEAST_SEEN)
         self._offset = (self._seen_std / error) ** 2  # readings that the prior of the seen shape's error is worth

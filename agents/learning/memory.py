@@ -15,7 +15,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 from agents.environment import EnvIndex
 from agents.estimation.candidates import ALL
 from agents.estimation.robot import Knowledge, RobotEstimator
-from ccr_gym import FORCE_SPAN, Settings, SpatialSettings
+from ccr_gym import Settings, SpatialSettings
 
 DECAYS = (0.0, 0.5, 0.8, 0.95)  # of the averages of past errors, per step
 MOVES = 6  # remembered moves of the motors
@@ -44,7 +44,7 @@ class Memory:
         self._errors = np.zeros((count, len(DECAYS)))
         self._moves = np.zeros((count, MOVES, moved))
         self._motors = np.full((count, moved), np.nan)
-        self._estimator = RobotEstimator(settings, count)
+        self._estimator, self._span = RobotEstimator(settings, count), settings.force_span
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
         self.size = sum(sizes.values()) + len(KNOWN) + sizes["cable"] + len(DECAYS) + MOVES * moved
 
@@ -69,7 +69,7 @@ class Memory:
 
     def _update_errors(self, observation: Mapping[str, np.ndarray], known: Knowledge, index: EnvIndex) -> np.ndarray:
         """Return decaying averages of the force errors on a logarithmic scale, ``(k, decays)``."""
-        missing = FORCE_SPAN * np.linalg.norm(observation["desired_force"].astype(float), axis=1) - known.force
+        missing = self._span * np.linalg.norm(observation["desired_force"].astype(float), axis=1) - known.force
         missing = np.copysign(np.log1p(np.abs(missing) / FINE), missing)
         errors = self._errors[index]
         errors = errors + (1 - np.array(DECAYS)) * (missing[:, None] - errors)
