@@ -8,6 +8,8 @@ from agents.environment import EnvIndex
 from ccr_gym import Sensing
 
 DRIFT = 0.5  # change of the error of virtual work over the change of the force, per step
+LEAST_NOISE = 1e-3  # of the sensor, where it has none [EI/L²]
+CORRECTED = 0.03  # standard deviation of a corrected force, over the force: a late reading is of another place
 LEAST_DRIFT = 0.01  # of such a change [EI/L²]
 
 
@@ -25,10 +27,10 @@ class ForceFilter:
 
     def __init__(self, count: int, sensing: Sensing, latency: int, span: float) -> None:
         self._span = span
-        self._noise = sensing.force_noise[1] ** 2
+        self._noise = max(sensing.force_noise[1], LEAST_NOISE) ** 2
         self._steps = 2 * sensing.force_resolution[1] ** 2 / 12  # of the zero as well; it does not average out
         self._zero, self._readings = np.zeros((count, 3)), np.zeros(count)
-        self._past = np.zeros((count, latency + 1))  # forces of virtual work, the present one first
+        self._past = np.zeros((count, latency + 2))  # forces of virtual work, the present one first
         self._shift, self._spread = np.zeros(count), np.full(count, np.inf)
 
     def reset(self, index: EnvIndex) -> None:
@@ -85,7 +87,7 @@ class ForceFilter:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the corrected force and its standard deviation."""
         size = np.linalg.norm(measured - self._zero[index][:, : measured.shape[1]], axis=1)
-        change = self._past[index][:, 0] - self._past[index][:, min(1, self._past.shape[1] - 1)]
+        change = self._past[index][:, 0] - self._past[index][:, 1]
         spread = np.minimum(self._spread[index] + (DRIFT * change) ** 2 + LEAST_DRIFT**2, variance)
         shift = np.where(np.isinf(self._spread[index]), 0.0, self._shift[index])
         known = touching & (then > 0)
@@ -94,5 +96,6 @@ class ForceFilter:
         shift = shift + gain * (size - then - shift)
         spread = (1 - gain) * spread
         self._shift[index], self._spread[index] = np.where(touching, shift, 0.0), np.where(touching, spread, np.inf)
-        deviation = np.sqrt(spread + self._steps)
-        return np.where(touching, np.maximum(force + shift, 0.0), 0.0), np.where(touching, deviation, 0.0)
+        force = np.maximum(force + shift, 0.0)
+        deviation = np.sqrt(spread + self._steps + (CORRECTED * force) ** 2)
+        return np.where(touching, force, 0.0), np.where(touching, deviation, 0.0)

@@ -18,7 +18,7 @@ PLAY_ERROR = 0.001  # standard deviation of a seen command that neither noise no
 RIGIDITY_ERROR = 0.01  # standard deviation of the nominal tension, over the tension
 LOSS_ERROR = 0.003  # likewise, of the share of friction
 LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
-MODEL_ERROR = 0.08  # standard deviation of virtual work over the force: other points move than those of a free robot
+MODEL_ERROR = 0.1  # standard deviation of virtual work over the force: other points move than those of a free robot
 
 
 class Knowledge(NamedTuple):
@@ -167,8 +167,8 @@ def _moments(values: np.ndarray, weights: np.ndarray, least: float = 0.0) -> tup
 
     Between candidates the truth is taken to be spread evenly, and the models to err by at least so much.
     """
-    mean = weights @ values
+    mean = (weights * values).sum(axis=1)
     step = values[1] - values[0] if len(values) > 1 else 0.0
-    variance = weights @ values**2 - mean**2 + step**2 / 12
+    variance = (weights * values**2).sum(axis=1) - mean**2 + step**2 / 12
     least = least if len(values) > 1 else 0.0
     return mean, np.sqrt(np.maximum(variance, 0.0) + least**2)

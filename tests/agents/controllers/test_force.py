@@ -3,6 +3,7 @@ import pytest
 
 from agents.benchmark.evaluate import run_episodes
 from agents.controllers.force import ForceController
+from agents.environment import make_env
 from ccr_gym import ENV_IDS
 
 
@@ -20,33 +21,34 @@ def test_with_ideal_sensing_it_reaches_the_set_point(env_id, kind):
 
 
 def test_it_searches_until_something_touches_and_forgets():
-    controller, goal, cable = ForceController(), np.array([0.3], np.float32), np.zeros(1, np.float32)
-    cable = np.zeros(1, np.float32)
+    env, controller = make_env("CCR/PushObstacle-v1"), ForceController()
+    observation, _ = env.reset(seed=0)
+    controller.reset(env)
 
-    def sensor(force):
-        return {"force_measured": np.array([0.0, force], np.float32), "desired_force": goal, "cable": cable}
+    def seen(force, *, touching=True):
+        sensor = np.array([0.0, force], np.float32)
+        return {**observation, "force_measured": sensor, "contact": np.full_like(observation["contact"], touching)}
 
-    free = {**sensor(0.0), "contact": np.zeros(38, np.float32)}
-    touching, less = ({**sensor(force), "contact": np.ones(38, np.float32)} for force in (0.28, 0.26))
-    assert controller.act(free) == 1
-    first = controller.act(touching)
+    goal = float(observation["desired_force"][0])
+    assert controller.act(seen(0.0, touching=False)) == 1
+    first = controller.act(seen(goal - 0.02))
     assert 0 < first < 1
-    assert controller.act(less) > 2 * first
-    controller.reset()
-    assert controller.act(touching) == first
-    assert controller.act({**sensor(1.3), "contact": np.ones(38, np.float32)}) == -1
+    assert controller.act(seen(goal - 0.04)) > 2 * first
+    controller.reset(env)
+    assert controller.act(seen(goal - 0.02)) == first
+    assert controller.act(seen(goal + 1.0)) == -1
 
 
-def test_what_the_sensor_reads_without_contact_is_taken_off():
-    controller, goal, cable = ForceController(), np.array([0.3], np.float32), np.zeros(1, np.float32)
-    for reading, touching in (([0.02, -0.01], 0.0), ([0.04, -0.03], 0.0), ([0.03, 0.28], 1.0)):
-        seen = {
-            "force_measured": np.array(reading, np.float32),
-            "desired_force": goal,
-            "cable": cable,
-        }
-        action = controller.act({**seen, "contact": np.full(38, touching, np.float32)})
-    assert action == pytest.approx(0, abs=1e-6)
+def test_it_needs_its_environment():
+    with pytest.raises(ValueError, match=r"call reset\(env\)"):
+        ForceController().reset()
+
+
+@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/LoadCell-v1"])
+def test_without_a_force_sensor_it_regulates_what_it_knows(env_id):
+    kwargs = {"sensing": "sensorless", "split": "train"}
+    played = run_episodes(ForceController.tuned(env_id, "sensorless"), env_id, seed=50, count=12, **kwargs)
+    assert np.median([np.median(episode.error[-16:]) for episode in played]) < 0.15
 
 
 def test_the_same_episodes_give_the_same_numbers():

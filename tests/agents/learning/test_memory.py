@@ -1,60 +1,37 @@
 import numpy as np
 import pytest
-from gymnasium import spaces
 
 from agents.environment import make_env
-from agents.learning.memory import DECAYS, MOVES, Memory, MemoryVecEnv
+from agents.estimation.robot import RobotEstimator
+from agents.learning.memory import DECAYS, FINE, KNOWN, MOVES, Memory, MemoryVecEnv
 from agents.learning.sb3_adapter import SB3VecEnv
-from ccr_gym import ENV_IDS, Settings
+from ccr_gym import ENV_IDS
 
 
-def memory():
-    sizes = {"cable": 1, "contact": 2, "desired_force": 1, "force_est": 2, "force_measured": 2, "nodes": 3 * 19}
-    space = spaces.Dict({key: spaces.Box(-1.0, 1.0, (size,)) for key, size in sizes.items()})
-    settings = Settings()
-    return Memory(space, 1, settings), sum(sizes.values())
-
-
-def seen(cable=0.0, touching=False, measured=(0.0, 0.0), estimate=(0.0, 0.0), desired=0.2):
-    rows = {"cable": [cable], "contact": [touching, False], "desired_force": [desired]}
-    straight = np.column_stack([np.zeros(19), np.linspace(0, 1, 19), np.zeros(19)]).ravel()
-    rows |= {"force_est": estimate, "force_measured": measured, "nodes": straight}
-    return {key: np.array([row], np.float32) for key, row in rows.items()}
-
-
-def test_what_the_sensor_reads_without_contact_is_its_zero():
-    remembers, start = memory()
-    for reading in ((0.02, 0.04), (0.04, 0.02)):
-        row = remembers.update(seen(measured=reading))[0]
-        assert row[start + 2 : start + 4] == pytest.approx([0, 0])  # neither ratio nor force
-    row = remembers.update(seen(touching=True, measured=(0.03, 0.13), estimate=(0.0, 0.4)))[0]
-    assert row[start : start + 4] == pytest.approx([0.03, 0.03, 0.25, 0.1], abs=1e-6)
-
-
-def test_the_ratio_of_sensor_and_estimate_is_fitted_to_all_readings():
-    remembers, start = memory()
-    generator = np.random.default_rng(0)
-    for _ in range(60):
-        size = generator.uniform(0.2, 0.6)
-        noisy = (0.0, 0.3 * size + generator.normal(0, 0.01))
-        row = remembers.update(seen(touching=True, measured=noisy, estimate=(0.0, size)))[0]
-    assert row[start + 2] == pytest.approx(0.3, abs=0.01)
-    assert row[start + 3] == pytest.approx(0.3 * size, abs=0.005)
-
-
-def test_errors_fade_at_their_rates_and_moves_pass_by():
-    remembers, start = memory()
-    shown = [seen(cable, True, (0.0, force), (0.0, force)) for cable, force in ((0, 0.1), (0.1, 0.2))]
-    first, last = (remembers.update(each)[0] for each in shown)
-    errors = [row[start + 4 : start + 4 + 2 * len(DECAYS)].reshape(-1, 2) for row in (first, last)]
-    fading = np.array(DECAYS)[:, None]
-    assert errors[0] == pytest.approx((1 - fading) * errors[0][0])
-    assert errors[1] == pytest.approx(fading * errors[0], abs=1e-5)  # there is no error now
-    moves, (latency, slack, unseen, behind) = np.split(last[start + 4 + 2 * len(DECAYS) :], [MOVES])
-    assert moves == pytest.approx([2.8] + [0] * (MOVES - 1), abs=1e-6)
-    assert (latency, unseen, behind) == (pytest.approx(1), pytest.approx(0.175 - slack), pytest.approx(-slack))
-    remembers.reset()
-    assert np.array_equal(remembers.update(shown[0])[0], first)
+@pytest.mark.parametrize("sensing", ["ideal", "realistic", "sensorless"])
+def test_it_holds_what_is_known_past_errors_and_moves(sensing):
+    env = make_env("CCR/PushObstacle-v1", sensing=sensing)
+    settings = env.get_wrapper_attr("settings")
+    memory, estimator = Memory(env.observation_space, 1, settings), RobotEstimator(settings, 1)
+    observation, _ = env.reset(seed=0)
+    start = sum(value.size for value in observation.values())
+    errors, moves, before = np.zeros(len(DECAYS)), np.zeros(MOVES), None
+    for _ in range(30):
+        row = memory.update({key: value[None] for key, value in observation.items()})[0]
+        known = estimator.update_one(observation)
+        assert row.size == memory.size
+        told = row[start : start + len(KNOWN)]
+        assert told == pytest.approx([float(getattr(known, name)) for name in KNOWN], rel=1e-6)
+        motor = float(observation["cable"][0]) * settings.cable_limit_mm / settings.scales.travel_mm
+        assert row[start + len(KNOWN)] == pytest.approx(known.cables[0] - motor, abs=1e-6)
+        missing = settings.force_span * float(observation["desired_force"][0]) - float(known.force)
+        errors += (1 - np.array(DECAYS)) * (np.copysign(np.log1p(abs(missing) / FINE), missing) - errors)
+        assert row[start + len(KNOWN) + 1 :][: len(DECAYS)] == pytest.approx(errors, rel=1e-5)
+        moves = np.roll(moves, 1)
+        moves[0] = 0 if before is None else 28 * (float(observation["cable"][0]) - before)
+        assert row[-MOVES:] == pytest.approx(moves, abs=1e-5)
+        before = float(observation["cable"][0])
+        observation, *_ = env.step(np.full(1, 0.7, np.float32))
 
 
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
