@@ -309,24 +309,28 @@ class Transition:
         Returns:
             Regulated contact forces, ``(N, d)`` [N].
         """
-        commands, actuated_mm = self.batch.commands.copy(), self.adapter.bounded(actuated_mm)
-        self.adapter.write_command(commands, actuated_mm, ALL)
-        blocks = self.batch.probe(commands)
+        adapter, actuated_mm = self.adapter, self.adapter.bounded(actuated_mm)
+        blocks = self._probed(self.batch, actuated_mm)
         if self._settings.regulate == "estimate":
-            return self._probe_estimate(blocks, commands, actuated_mm)
-        forces = self.adapter.force(blocks, self._target)
-        return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
+            return self._probe_estimate(blocks, actuated_mm)
+        ratio = 1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None]
+        return np.asarray(adapter.force(blocks, self._target) * ratio)
 
-    def _probe_estimate(self, blocks: np.ndarray, commands: np.ndarray, actuated_mm: np.ndarray) -> np.ndarray:
-        """Return the estimated forces of robots in other equilibria, ``(N, d)`` [N]."""
-        tensions, onsets = self._layout.tensions(blocks), self._onsets
+    def _probed(self, batch: BaseBatch, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return the equilibria of a batch at other actuated coordinates, ``(N, size)``."""
+        commands = batch.commands.copy()
+        self.adapter.write_command(commands, actuated_mm, ALL)
+        return batch.probe(commands)
+
+    def _probe_estimate(self, blocks: np.ndarray, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return the estimates for robots in other equilibria, where motors are as far off as now, ``(N, d)`` [N]."""
+        tensions, onsets, known, read = self._layout.tensions(blocks), self._layout.onset(blocks), blocks, actuated_mm
         if self._sensors is not None:
-            tensions = self._sensors.measured_tensions(tensions, self._time, ALL)
-            blocks = self.model.probe(commands)
-        else:
-            onsets = self._layout.onset(blocks)
-        factors = self._estimator.probe(Measured(blocks, actuated_mm, tensions, onsets))
-        return np.asarray(factors[:, None] * self.adapter.force(blocks, self._target))
+            tensions, onsets = self._sensors.measured_tensions(tensions, self._time, ALL), self._onsets
+            read = self.adapter.bounded(actuated_mm + (self._encoders(ALL) - self._actuated_mm))
+            known = self._probed(self.model, read)
+        factors = self._estimator.probe(Measured(known, read, tensions, onsets))
+        return np.asarray(factors[:, None] * self.adapter.force(known, self._target))
 
     def get_rows(self, robots: list[int]) -> EpisodeState:
         """Return the states of the episodes of some robots."""
