@@ -147,5 +147,5 @@ class EpisodeBatch(Transition):
             nominal = as_scalar(np.ones(self.count)[index], index)
             return PrivilegedState(force, nominal, goal, actuated, actuated, np.zeros(actuated.shape))
         rigidity_ratio = as_scalar(sensors.rigidity_ratio[index], index)
-        motor, half_backlash = sensors.motor_mm(index), sensors.half_backlash_mm(index)
+        motor, half_backlash = sensors.motor_mm(index).copy(), sensors.half_backlash_mm(index)
         return PrivilegedState(force, rigidity_ratio, goal, actuated, motor, half_backlash)
