@@ -170,7 +170,7 @@ def uniform(numbers):
     ranked, count = np.sort(numbers), len(numbers)
     steps = np.arange(count + 1) / count
     distance = max((steps[1:] - ranked).max(), (ranked - steps[:-1]).max())
-    return bool(0 <= ranked[0] and ranked[-1] <= 1 and distance < 2.5 / np.sqrt(count))
+    return bool(ranked[0] >= 0 and ranked[-1] <= 1 and distance < 2.5 / np.sqrt(count))
 
 
 def test_imperfections_are_uniform_in_their_ranges_and_independent():

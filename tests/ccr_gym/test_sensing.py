@@ -12,7 +12,7 @@ from ccr_gym import FORCE_SPAN, Sensing
 from ccr_gym.sampling import is_test_draw
 from ccr_gym.scales import TENSION_SPAN
 from ccr_gym.sensing import EXACT
-from solver import Circle, Robot, Solver
+from solver import Circle, Robot, Scene, Solver
 from solver.spatial import SpatialSolver
 
 IDS = sorted(ccr_gym.ENV_IDS)
@@ -354,3 +354,26 @@ def test_invalid_ranges_are_refused(kwargs, message):
 def test_names_stand_for_the_default_ranges(sensing):
     assert make(sensing=sensing).settings.sensors == Sensing()
     assert make().settings.sensors is None
+
+
+@pytest.mark.parametrize("env_id", [env_id for env_id in IDS if "Spatial" not in env_id])
+def test_what_the_free_nominal_robot_needs_is_that_of_an_own_solver(env_id):
+    """What the tension has beyond it, over the lever, is the estimate of the contact force."""
+    env, others = make(env_id, sensing=only(latency=3)), [*BY_ESTIMATE, "CCR/BracedPush-v1"]  # which has two forces
+    unit = TENSION_SPAN * env.settings.scales.tension_n
+    env.reset(seed=2)
+    solver = Solver(env.settings.robot, Scene())
+    free, touched, generator = solver.rest(), 0, np.random.default_rng(0)
+    for _ in range(50):
+        action = generator.uniform(-0.2, 1, env.action_space.shape).astype(np.float32)
+        observation, *_, info = env.step(action)
+        free = solver.step(free, *env.privileged_state.motor_mm)
+        assert observation["free_tension"] * unit == pytest.approx(free.tensions, abs=1e-5 * unit)
+        if not observation["contact"].any():
+            assert observation["lever"] == 0
+        elif observation["lever"][0] > 0.05 and env_id not in others:
+            lacking = max(observation["tension"][0] - observation["free_tension"][0], 0.0)  # the rigidity is known
+            estimate = lacking / observation["lever"][0] * FORCE_SPAN * env.settings.scales.force_n
+            assert np.linalg.norm(info["force_est"]) == pytest.approx(estimate, rel=0.02)
+            touched += 1
+    assert touched >= 10 or env_id in others
