@@ -52,8 +52,9 @@ def describe(task: AnyTask, title: str, description: str, start: str, *, action:
             set-point), and the terms of the reward, `reward_force_error` and so on.""",
         "Arguments": f"""`render_mode`, the fields of `ccr_gym.settings.{type(settings).__name__}`, and `task`, given as
             `{type(task).__name__}` or as a mapping of its fields. Mappings make every argument JSON-able.
-            `sensing="realistic"` adds backlash, latency, noise, bias, unknown friction and unknown rigidity, sampled
-            anew in every episode. `randomize` draws the robot of every episode; the entry `robot` of
+            `sensing="realistic"` adds backlash, latency, noise and errors of the sensors, unknown friction and unknown
+            rigidity, sampled anew in every episode, and `"sensorless"` takes the force sensor away; contact flags are
+            those of the nominal model then. `randomize` draws the robot of every episode; the entry `robot` of
             observation and `info` tells which it is. `split="train"` and `split="test"` sample from disjoint sets of
             scenes.""",
         "Version History": "* v1: the rod, robots of any size; `-Paper-v1` is the paper's system to the letter.",

@@ -5,6 +5,7 @@ Single and vector environments are both shells around an :class:`EpisodeBatch`, 
 
 import numpy as np
 
+from ccr_gym.estimation import Measured
 from ccr_gym.goals import compute_reward
 from ccr_gym.observation import Known, Observation
 from ccr_gym.quantities import Quantity, as_scalar, norm, operations
@@ -13,6 +14,7 @@ from ccr_gym.reward import SUCCESS_ERROR, TERMS, reward_terms
 from ccr_gym.scales import AHEAD
 from ccr_gym.task import PROFILE_STEPS
 from ccr_gym.transition import ALL, Transition
+from solver.common.batch import BaseBatch
 
 SHOWN_FORCE = 4.0  # that fills the scale of a picture [EI/L²]
 
@@ -147,5 +149,48 @@ class EpisodeBatch(Transition):
             nominal = as_scalar(np.ones(self.count)[index], index)
             return PrivilegedState(force, nominal, goal, actuated, actuated, np.zeros(actuated.shape))
         rigidity_ratio = as_scalar(sensors.rigidity_ratio[index], index)
-        motor, half_backlash = sensors.motor_mm(index), sensors.half_backlash_mm(index)
+        motor, half_backlash = sensors.motor_mm(index).copy(), sensors.half_backlash_mm(index)
         return PrivilegedState(force, rigidity_ratio, goal, actuated, motor, half_backlash)
+
+    def obstacles_moved_mm(self, index: int | slice) -> np.ndarray:
+        """Return how far the first obstacle has moved since the start, ``(..., d)`` [mm]."""
+        robots = np.arange(self.count)[index]
+        moved = np.zeros((self.count, self.adapter.space))
+        for robot in np.atleast_1d(robots).tolist():
+            start = self._starts[robot]
+            if start is not None and len(start):
+                now = self.batch.scene(robot).obstacles[0].extent.center
+                moved[robot] = np.subtract(now, start.obstacles[0].extent.center)
+        return np.asarray(moved[index])
+
+    def probe(self, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return the contact forces that all robots would have at other actuated coordinates; nothing moves.
+
+        Args:
+            actuated_mm: Actuated coordinates, ``(N, actions)`` [mm]; clipped to their bounds.
+
+        Returns:
+            Regulated contact forces, ``(N, d)`` [N].
+        """
+        adapter, actuated_mm = self.adapter, self.adapter.bounded(actuated_mm)
+        blocks = self._probed(self.batch, actuated_mm)
+        if self._settings.regulate == "estimate":
+            return self._probe_estimate(blocks, actuated_mm)
+        ratio = 1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None]
+        return np.asarray(adapter.force(blocks, self._target) * ratio)
+
+    def _probed(self, batch: BaseBatch, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return the equilibria of a batch at other actuated coordinates, ``(N, size)``."""
+        commands = batch.commands.copy()
+        self.adapter.write_command(commands, actuated_mm, ALL)
+        return batch.probe(commands)
+
+    def _probe_estimate(self, blocks: np.ndarray, actuated_mm: np.ndarray) -> np.ndarray:
+        """Return the estimates for robots in other equilibria, where motors are as far off as now, ``(N, d)`` [N]."""
+        tensions, onsets, known, read = self._layout.tensions(blocks), self._layout.onset(blocks), blocks, actuated_mm
+        if self._sensors is not None:
+            tensions, onsets = self._sensors.measured_tensions(tensions, self._time, ALL), self._onsets
+            read = self.adapter.bounded(actuated_mm + (self._encoders(ALL) - self._actuated_mm))
+            known = self._probed(self.model, read)
+        factors = self._estimator.probe(Measured(known, read, tensions, onsets))
+        return np.asarray(factors[:, None] * self.adapter.force(known, self._target))

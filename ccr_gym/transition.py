@@ -274,17 +274,6 @@ class Transition:
         """Return the scene of a robot at the start of its episode."""
         return self._starts[robot]
 
-    def obstacles_moved_mm(self, index: EnvIndex) -> np.ndarray:
-        """Return how far the first obstacle has moved since the start, ``(..., d)`` [mm]."""
-        robots = np.arange(self.count)[index]
-        moved = np.zeros((self.count, self.adapter.space))
-        for robot in np.atleast_1d(robots).tolist():
-            start = self._starts[robot]
-            if start is not None and len(start):
-                now = self.batch.scene(robot).obstacles[0].extent.center
-                moved[robot] = np.subtract(now, start.obstacles[0].extent.center)
-        return np.asarray(moved[index])
-
     def _estimate(self, index: EnvIndex) -> None:
         """Estimate the forces of robots that have moved."""
         if not (self._estimator.learns or self._layout.flags(self.model.blocks[index]).any()):
@@ -299,34 +288,6 @@ class Transition:
     def _encoders(self, index: EnvIndex) -> np.ndarray:
         """Return the actuated coordinates that the encoders of the motors read, ``(..., actions)`` [mm]."""
         return np.asarray(self._actuated_mm[index] if self._sensors is None else self._sensors.motor_mm(index))
-
-    def probe(self, actuated_mm: np.ndarray) -> np.ndarray:
-        """Return the contact forces that all robots would have at other actuated coordinates; nothing moves.
-
-        Args:
-            actuated_mm: Actuated coordinates, ``(N, actions)`` [mm]; clipped to their bounds.
-
-        Returns:
-            Regulated contact forces, ``(N, d)`` [N].
-        """
-        commands, actuated_mm = self.batch.commands.copy(), self.adapter.bounded(actuated_mm)
-        self.adapter.write_command(commands, actuated_mm, ALL)
-        blocks = self.batch.probe(commands)
-        if self._settings.regulate == "estimate":
-            return self._probe_estimate(blocks, commands, actuated_mm)
-        forces = self.adapter.force(blocks, self._target)
-        return forces * (1.0 if self._sensors is None else self._sensors.rigidity_ratio[:, None])
-
-    def _probe_estimate(self, blocks: np.ndarray, commands: np.ndarray, actuated_mm: np.ndarray) -> np.ndarray:
-        """Return the estimated forces of robots in other equilibria, ``(N, d)`` [N]."""
-        tensions, onsets = self._layout.tensions(blocks), self._onsets
-        if self._sensors is not None:
-            tensions = self._sensors.measured_tensions(tensions, self._time, ALL)
-            blocks = self.model.probe(commands)
-        else:
-            onsets = self._layout.onset(blocks)
-        factors = self._estimator.probe(Measured(blocks, actuated_mm, tensions, onsets))
-        return np.asarray(factors[:, None] * self.adapter.force(blocks, self._target))
 
     def get_rows(self, robots: list[int]) -> EpisodeState:
         """Return the states of the episodes of some robots."""

@@ -84,8 +84,10 @@ class Robot:
         check_rod(self, 2, (Cable(),))
         object.__setattr__(self, "precurvature", checked_angles(self, self.precurvature))
         check_disks(self)
-        check_point_count(self, len(self.lines_mm) * self.positions)
         self._check_cable_limit()
+        check_point_count(
+            self, len(self.lines_mm) * self.positions
+        )  # last: the lines are kept for a robot that is valid
 
     def _check_cable_limit(self) -> None:
         # The equal shares of the paper's model take from every segment alike, also at its shortest.

@@ -13,7 +13,7 @@ import ccr_gym
 from solver import Circle
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
-EVERY_SENSING = pytest.mark.parametrize("sensing", ["ideal", "realistic"])
+EVERY_SENSING = pytest.mark.parametrize("sensing", ["ideal", "realistic", "sensorless"])
 STEPS = 80
 
 
@@ -82,7 +82,7 @@ def test_copies_continue_in_another_process(env_id):
 
 
 @EVERY_ID
-@EVERY_SENSING
+@pytest.mark.parametrize("sensing", ["ideal", "realistic"])
 def test_vector_environments_continue_with_the_same_bits(env_id, sensing):
     env = make_vec(env_id, sensing=sensing)
     env.reset(seed=2)

@@ -93,9 +93,9 @@ def test_invalid_tasks_are_refused(env_id, task, message):
         ({"sensing": {"latency": (0, 8)}}, "latency is.*whole numbers from 0 to 7"),
         ({"sensing": {"latency": (False, 1)}}, "latency is"),
         ({"sensing": {"latency": 3}}, "latency is 3"),
-        ({"sensing": {"noise": (0, NAN)}}, "noise is"),
+        ({"sensing": {"force_noise": (0, NAN)}}, "force_noise is"),
         ({"sensing": {"backlash": (-1, 1)}}, "backlash is"),
-        ({"sensing": {"bias": "a"}}, "bias is 'a'"),
+        ({"sensing": {"force_bias": "a"}}, "force_bias is 'a'"),
         ({"max_increment_mm": NAN}, "max_increment_mm is nan"),
         ({"max_increment_mm": 15}, "max_increment_mm is 15.0; it must be at most 14, the cable_limit_mm"),
         ({"cable_limit_mm": INF}, "cable_limit_mm is inf"),
@@ -149,7 +149,10 @@ def test_robots_that_cannot_bend_to_the_obstacles_are_refused(env_id, cables, wh
         ({"task": 0}, "task is 0"),
         ({"robot": 180.0}, "robot is 180.0; it must be a Robot, a mapping of its fields, or the name of a preset"),
         ({"weights": [1, 1]}, r"weights is \[1, 1\]; it must be a RewardWeights or a mapping"),
-        ({"sensing": None}, "sensing is None; it must be 'ideal', 'realistic' or the fields of a Sensing"),
+        (
+            {"sensing": None},
+            "sensing is None; it must be 'ideal', 'realistic', 'sensorless' or the fields of a Sensing",
+        ),
     ],
 )
 def test_unknown_names_and_wrong_classes_are_refused(kwargs, message):
