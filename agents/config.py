@@ -27,7 +27,7 @@ RANGES = {  # of the real-valued settings of learners
     "huber": (1e-9, 1e9),
 }
 
-POLICIES = ("P", "PI", "MPC", "Newton", *LEARNERS, "Oracle")
+POLICIES = ("P", "PI", "MPC", "Harmonic", "Newton", *LEARNERS, "Oracle")
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 Learner = (
@@ -151,6 +151,8 @@ class EvaluateConfig:
     """Environments to evaluate on, unless `runs` are given."""
     policies: tuple[str, ...] = POLICIES
     """Policies to evaluate; the learned ones come from `pretrained`, or from `runs`."""
+    sensing: Literal["ideal", "realistic", "sensorless"] | None = None
+    """Sensing of the environments, for which learned policies must have been trained; by default that of each."""
     episodes: int = 100
     """Episodes per policy and environment; all policies play the same scenes."""
     seed: int = EVALUATION_SEED

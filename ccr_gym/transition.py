@@ -194,6 +194,7 @@ class Transition:
             self.model.rest(robots)
         self._estimator.rest(robots, [own.robot for own in drawn])
         self._last_actions[robots], self._time[robots] = 0.0, 0
+        self._onsets[robots] = 0.0
         self._actuated_mm[robots] = self.adapter.actuated_mm(self.batch.blocks[robots], self._actuated_mm[robots] * 0.0)
         if self._settings.randomize is not None:
             self._note_drawn(robots, imperfections, drawn)

@@ -12,6 +12,7 @@ from agents.benchmark.statistics import cvar, iqm, iqm_interval
 from agents.benchmark.video import record
 from agents.config import EvaluateConfig
 from agents.controllers.force import ForceController
+from agents.controllers.harmonic import HarmonicController
 from agents.controllers.mpc import PredictiveController
 from agents.controllers.newton import NewtonController
 from agents.errors import UserError
@@ -24,12 +25,13 @@ from agents.workers import worker_pool
 from solver import Status
 
 SHOWN = 4  # first episodes, which figures show
-CONTROLLERS: dict[str, Callable[[str], Policy]] = {  # made for an environment
+CONTROLLERS: dict[str, Callable[[str, str | None], Policy]] = {  # made for an environment and its sensing
     "P": ForceController.proportional_only,
     "PI": ForceController.tuned,
-    "MPC": lambda _: PredictiveController(),
-    "Newton": lambda _: NewtonController(),
-    "Oracle": lambda _: NewtonController.knowing(),
+    "MPC": lambda *_: PredictiveController(),
+    "Harmonic": lambda *_: HarmonicController(),
+    "Newton": lambda *_: NewtonController(),
+    "Oracle": lambda *_: NewtonController.knowing(),
 }
 
 
@@ -52,7 +54,7 @@ class Entry:
     def load(self) -> list[Policy]:
         """Return the policies of all training seeds, or the controller."""
         if self.policy in CONTROLLERS:
-            return [CONTROLLERS[self.policy](self.env_id)]
+            return [CONTROLLERS[self.policy](self.env_id, self.sensing)]
         return [LearnedPolicy(file) for file in self.files]
 
 
@@ -132,11 +134,11 @@ def _entries_of_runs(config: EvaluateConfig) -> list[Entry]:
 
 def _entries_of_package(config: EvaluateConfig) -> list[Entry]:
     found = [
-        Entry(policy, env_id, sensing_of(env_id), files)
+        Entry(policy, env_id, config.sensing or sensing_of(env_id), files)
         for env_id in config.env_ids
         for policy in config.policies
         for files in [trained(policy, env_id, config.pretrained)]
-        if policy not in LEARNERS or files
+        if policy not in LEARNERS or (files and config.sensing in (None, sensing_of(env_id)))
     ]
     learners = [policy for policy in config.policies if policy in LEARNERS]
     if learners and not any(entry.files for entry in found):

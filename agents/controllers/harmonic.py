@@ -25,7 +25,7 @@ class HarmonicController(PredictiveController):
     set-points.
     """
 
-    name: str = "Harmonic MPC"
+    name: str = "Harmonic"
 
     def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:
         series = self._series(cable, len(goals)) if len(self._readings) > ENOUGH else None

@@ -20,7 +20,7 @@ def scaled(robot, s):
 
 def played(name, env_id, robot, steps=40):
     """Return the actions of an episode."""
-    env, policy = make_env(env_id, robot=robot, sensing="realistic"), CONTROLLERS[name](env_id)
+    env, policy = make_env(env_id, robot=robot, sensing="realistic"), CONTROLLERS[name](env_id, "realistic")
     observation, _ = env.reset(seed=3)
     policy.reset(env)
     actions = []
@@ -51,7 +51,7 @@ def test_a_robot_of_another_size_gets_the_same_actions(name, env_id, robot):
 @pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/SpatialPush-v1"])
 @pytest.mark.parametrize("robot", ["snake-arm", "rao-2021", "neuroendoscope"])
 def test_robots_of_several_sections_are_regulated(name, env_id, robot):
-    env, policy = make_env(env_id, robot=robot), CONTROLLERS[name](env_id)
+    env, policy = make_env(env_id, robot=robot), CONTROLLERS[name](env_id, None)
     errors = []
     for seed in range(3):
         observation, _ = env.reset(seed=seed)
