@@ -64,8 +64,13 @@ def set_points(observation: Observation, steps: int, span: float) -> np.ndarray:
 def natural(state: PrivilegedState, scales: Scales) -> PrivilegedState:
     """Return a state in the natural units of its robot: forces in EI/L², places in the cable travel a."""
     force, travel = scales.force_n, scales.travel_mm
-    places = (state.actuated_mm / travel, state.motor_mm / travel, state.half_backlash_mm / travel)
-    return PrivilegedState(state.force / force, state.rigidity_ratio, state.goal / force, *places)
+    return state._replace(
+        force=state.force / force,
+        goal=state.goal / force,
+        actuated_mm=state.actuated_mm / travel,
+        motor_mm=state.motor_mm / travel,
+        half_backlash_mm=state.half_backlash_mm / travel,
+    )
 
 
 def motor_actions(moves: np.ndarray, state: PrivilegedState, increments: np.ndarray) -> np.ndarray:

@@ -146,11 +146,13 @@ class EpisodeBatch(Transition):
         goal = self._goal_n[index].copy() if self._vector else self._desired(1, index)
         actuated = self._actuated_mm[index].copy()
         if sensors is None:
-            nominal = as_scalar(np.ones(self.count)[index], index)
-            return PrivilegedState(force, nominal, goal, actuated, actuated, np.zeros(actuated.shape))
-        rigidity_ratio = as_scalar(sensors.rigidity_ratio[index], index)
+            ratio, loss, delay = (as_scalar(np.full(self.count, value)[index], index) for value in (1.0, 0.0, 0))
+            return PrivilegedState(force, ratio, goal, actuated, actuated, np.zeros(actuated.shape), loss, delay)
+        ratio, loss, delay = (
+            as_scalar(entry[index], index) for entry in (sensors.rigidity_ratio, sensors.tendon_loss, sensors.latency)
+        )
         motor, half_backlash = sensors.motor_mm(index).copy(), sensors.half_backlash_mm(index)
-        return PrivilegedState(force, rigidity_ratio, goal, actuated, motor, half_backlash)
+        return PrivilegedState(force, ratio, goal, actuated, motor, half_backlash, loss, delay)
 
     def obstacles_moved_mm(self, index: int | slice) -> np.ndarray:
         """Return how far the first obstacle has moved since the start, ``(..., d)`` [mm]."""

@@ -43,6 +43,8 @@ class PrivilegedState(NamedTuple):
         actuated_mm: Actuated coordinates of the robot, ``(..., actions)`` [mm].
         motor_mm: Positions of the motors, ``(..., actions)`` [mm].
         half_backlash_mm: How far both can be apart, ``(..., actions)`` [mm].
+        tendon_loss: Share of the tension that friction takes.
+        latency: Delay of shape and force sensor [steps].
     """
 
     force: np.ndarray
@@ -51,3 +53,5 @@ class PrivilegedState(NamedTuple):
     actuated_mm: np.ndarray
     motor_mm: np.ndarray
     half_backlash_mm: np.ndarray
+    tendon_loss: Quantity
+    latency: Quantity

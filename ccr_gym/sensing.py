@@ -25,10 +25,10 @@ HISTORY = 8  # observations kept, more than the largest latency
 MAX_LOSS = 0.9  # share of the tension that friction takes at most
 DEGREE = math.pi / 180
 STATE = (
-    "_latency",
+    "latency",
     "_backlash_mm",
     "_motor_mm",
-    "_loss",
+    "tendon_loss",
     "_moved_in",
     "_tension_noise",
     "_tension_zero",
@@ -216,6 +216,8 @@ class SensorModel:
 
     Attributes:
         rigidity_ratio: Rigidity of each robot over its nominal value, ``(N,)``.
+        tendon_loss: Share of the tension that friction takes, ``(N,)``.
+        latency: Delay of shape and force sensor, ``(N,)`` [steps].
 
     Args:
         count: Number N of robots.
@@ -227,10 +229,10 @@ class SensorModel:
     def __init__(self, count: int, body: Body, actions: ActionSpec, delayed: np.ndarray) -> None:
         self._actions, self._delayed, self._body = actions, delayed, body
         self._has_backlash = np.arange(actions.size) < actions.commands  # cables have, the insertion has none
-        self._latency = np.zeros(count, int)
+        self.latency = np.zeros(count, int)
         self._backlash_mm = np.zeros(count)
         self._motor_mm = np.zeros((count, actions.size))
-        self._loss, self._moved_in = np.zeros(count), np.ones((count, body.cables), bool)
+        self.tendon_loss, self._moved_in = np.zeros(count), np.ones((count, body.cables), bool)
         self._tension_noise, self._tension_zero = np.zeros(count), np.zeros((count, body.cables))
         self._force_noise, self._force_bias = np.zeros(count), np.zeros((count, body.space))
         self._force_resolution = np.zeros(count)
@@ -244,8 +246,8 @@ class SensorModel:
 
     def begin_episode(self, robot: int, sampled: Imperfections, motor_mm: np.ndarray) -> None:
         """Begin a robot's next episode, with the motors at these positions."""
-        self._latency[robot], self._backlash_mm[robot] = sampled.latency, sampled.backlash_mm
-        self._loss[robot], self.rigidity_ratio[robot] = sampled.tendon_loss, sampled.rigidity_ratio
+        self.latency[robot], self._backlash_mm[robot] = sampled.latency, sampled.backlash_mm
+        self.tendon_loss[robot], self.rigidity_ratio[robot] = sampled.tendon_loss, sampled.rigidity_ratio
         self._tension_noise[robot], self._tension_zero[robot] = sampled.tension_noise, sampled.tension_zero
         self._force_noise[robot], self._force_bias[robot] = sampled.force_noise, sampled.force_bias
         self._force_resolution[robot] = sampled.force_resolution
@@ -271,7 +273,7 @@ class SensorModel:
         return self._transmission(index).motor_tensions(ratio * tensions)
 
     def _transmission(self, index: EnvIndex) -> Transmission:
-        return Transmission(np.asarray(self._loss[index]), self._moved_in[index])
+        return Transmission(np.asarray(self.tendon_loss[index]), self._moved_in[index])
 
     def apply_backlash(self, actuated_mm: np.ndarray, increment_mm: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Move the motors by increments, within bounds, and return where that leaves the actuated coordinates [mm].
@@ -333,5 +335,5 @@ class SensorModel:
         self._history[robots[empty]] = present[empty, None]
         self._history_empty[robots] = False
         self._history[robots, now % HISTORY] = present
-        earlier = self._history[robots, (now - self._latency[robots]) % HISTORY]
+        earlier = self._history[robots, (now - self.latency[robots]) % HISTORY]
         return np.where(self._delayed, earlier, present).reshape(rows.shape)

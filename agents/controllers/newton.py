@@ -95,7 +95,7 @@ class NewtonController:
         ratio = float(known.rigidity)
         force = ratio / state.rigidity_ratio * state.force  # from the nominal model's
         slack = np.where(np.arange(state.half_backlash_mm.size) < cables, known.half_backlash, 0.0)  # insertion: none
-        return PrivilegedState(force, ratio, goal, state.actuated_mm, state.motor_mm, slack)
+        return state._replace(force=force, rigidity_ratio=ratio, goal=goal, half_backlash_mm=slack)
 
     def _slopes(self, actuated: np.ndarray, scales: Scales, size: float) -> np.ndarray:
         """Return the slopes of the regulated force in the actuated displacements, ``(actions, d)`` [EI/L² per a].

@@ -18,7 +18,7 @@ def probed(env_id, sensing, count=COUNT, seed=5):
     Returns what is known at the end, the truth, and whether a robot touches.
     """
     envs = gymnasium.make_vec(env_id, count, sensing=sensing, obs_mode="dict", autoreset_mode="Disabled")
-    settings, sensors = envs.unwrapped.settings, envs.unwrapped._episodes._sensors
+    settings = envs.unwrapped.settings
     observation, _ = envs.reset(seed=seed)
     estimator = RobotEstimator(settings, count)
     known = estimator.update(observation)
@@ -35,8 +35,9 @@ def probed(env_id, sensing, count=COUNT, seed=5):
         observation, _, _, _, info = envs.step((speed[:, None] * search(observation)).astype(np.float32))
         known = estimator.update(observation)
     force = np.linalg.norm(info["force_true"], axis=1) / settings.scales.force_n
-    half = sensors._backlash_mm / 2 / settings.scales.travel_mm
-    truth = dict(zip(NUMBERS, (sensors._latency, half, sensors._loss, sensors.rigidity_ratio, force), strict=True))
+    state = envs.unwrapped.privileged_state
+    half = state.half_backlash_mm[:, 0] / settings.scales.travel_mm
+    truth = dict(zip(NUMBERS, (state.latency, half, state.tendon_loss, state.rigidity_ratio, force), strict=True))
     return known, truth, observation["contact"].any(axis=1) & (force > 0.1)
 
 
