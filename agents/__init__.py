@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     from agents.benchmark.evaluate import run_episodes as run_episodes
     from agents.benchmark.evaluate import scores as scores
     from agents.controllers.force import ForceController as ForceController
+    from agents.controllers.harmonic import HarmonicController as HarmonicController
     from agents.controllers.mpc import PredictiveController as PredictiveController
     from agents.controllers.newton import NewtonController as NewtonController
+    from agents.estimation.robot import Knowledge as Knowledge
+    from agents.estimation.robot import RobotEstimator as RobotEstimator
     from agents.learning.actor import LearnedPolicy as LearnedPolicy
     from agents.learning.differentiable import differentiable as differentiable
     from agents.learning.memory import MemoryVecEnv as MemoryVecEnv
@@ -24,11 +27,14 @@ if TYPE_CHECKING:
     from agents.paper.reproduce import reproduce as reproduce
     from agents.policy import Observation as Observation
     from agents.policy import Policy as Policy
+    from agents.policy import search as search
 
 PART_OF = "ccr-gym"  # tells this package from others of its name
 _MODULES = {
     "Episode": "benchmark.evaluate",
     "ForceController": "controllers.force",
+    "HarmonicController": "controllers.harmonic",
+    "Knowledge": "estimation.robot",
     "LearnedPolicy": "learning.actor",
     "MemoryVecEnv": "learning.memory",
     "Metrics": "benchmark.evaluate",
@@ -36,6 +42,7 @@ _MODULES = {
     "Observation": "policy",
     "Policy": "policy",
     "PredictiveController": "controllers.mpc",
+    "RobotEstimator": "estimation.robot",
     "SB3VecEnv": "learning.sb3_adapter",
     "differentiable": "learning.differentiable",
     "measure": "benchmark.evaluate",
@@ -43,6 +50,7 @@ _MODULES = {
     "run_episode": "benchmark.evaluate",
     "run_episodes": "benchmark.evaluate",
     "scores": "benchmark.evaluate",
+    "search": "policy",
     "trained": "learning.pretrained",
 }
 __all__ = list(_MODULES)

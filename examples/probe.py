@@ -12,8 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import tyro
 
-from agents.estimation.robot import RobotEstimator
-from agents.policy import search
+from agents import RobotEstimator, search
 
 BACK = slice(8, 13)  # steps of the reversal, before contact
 GAIN = 1.3  # action per EI/L² of force error

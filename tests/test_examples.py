@@ -24,6 +24,16 @@ def test_ppo_trains_and_prints_its_error():
     assert re.fullmatch(r"mean action, 100 unseen scenes: median final error \d+\.\d\d%", test)
 
 
+def test_a_reversal_tells_the_loss(tmp_path):
+    example = runpy.run_path(str(EXAMPLES / "probe.py"))
+    args = example["Args"](episodes=40, out=tmp_path / "probe.png")
+    alone, reversed_once = (example["play"](args, probing=probing) for probing in (False, True))
+    for k, ratio in ((0, 0.5), (1, 0.9)):  # errors of the loss, and of the force
+        assert np.median(reversed_once[k][-16:]) < ratio * np.median(alone[k][-16:])
+    example["main"](args)
+    assert args.out.stat().st_size > 10_000
+
+
 def test_in_ppo_the_last_observation_of_an_episode_follows_its_last_step():
     example = runpy.run_path(str(EXAMPLES / "ppo.py"))
     experience = example["Experience"](example["Args"](envs=3))
