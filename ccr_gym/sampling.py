@@ -90,7 +90,7 @@ class Trials:
                 return desired, [assignments[k] for k in range(len(robots))]
         raise RuntimeError(
             f"none of {MAX_SAMPLES} samples of {self._task} can be pushed as desired within {self._limit_mm:.6g} mm of "
-            "cable; widen the task's ranges or the cable limit"
+            "cable and the tension limit; widen the task's ranges, or either limit"
         )
 
     @property
