@@ -130,13 +130,6 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         """Return actions ``(..., actions)`` within [−1, 1]."""
         return np.asarray(np.minimum(np.maximum(actions.astype(float), -1.0), 1.0))
 
-    def mean_square(self, actions: np.ndarray) -> np.ndarray:
-        """Return the mean square over the actions, added one by one: the bits do not depend on their number of rows."""
-        total = actions[..., 0] * actions[..., 0]
-        for k in range(1, actions.shape[-1]):
-            total = total + actions[..., k] * actions[..., k]
-        return np.asarray(total / actions.shape[-1])
-
     def bounded(self, actuated_mm: np.ndarray) -> np.ndarray:
         """Return actuated coordinates ``(..., actions)`` within their bounds [mm]."""
         return np.asarray(np.minimum(np.maximum(actuated_mm, self.actions.low_mm), self.actions.high_mm))

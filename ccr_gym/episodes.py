@@ -15,6 +15,7 @@ from ccr_gym.scales import AHEAD
 from ccr_gym.task import PROFILE_STEPS
 from ccr_gym.transition import ALL, Transition
 from solver.common.batch import BaseBatch
+from solver.common.operations import dot
 
 SHOWN_FORCE = 4.0  # that fills the scale of a picture [EI/L²]
 
@@ -116,7 +117,8 @@ class EpisodeBatch(Transition):
     def rewards(self, reading: ForceReading, index: int | slice = ALL) -> tuple[Quantity, ...]:
         """Return the reward terms of the last step."""
         clearance = as_scalar(self._layout.clearance(reading.blocks)[..., 0], index) / self.adapter.scales.length_mm
-        effort = as_scalar(self.adapter.mean_square(self._last_actions[index]), index)
+        actions = self._last_actions[index]
+        effort = as_scalar(dot(actions, actions) / actions.shape[-1], index)
         weights, force, desired = self._settings.weights, reading.force, reading.desired
         return reward_terms(weights, force, desired, reading.error, clearance, effort, operations(index))
 

@@ -18,7 +18,7 @@ from ccr_gym.adapters import AnyAdapter
 from ccr_gym.quantities import EnvIndex
 from ccr_gym.state import Arrays, put, take
 from solver import RigidityFit, Robot, Scene, fitted_slopes, virtual_work
-from solver.common.operations import ARRAYS
+from solver.common.operations import ARRAYS, dot
 from solver.common.rows import Rows
 from solver.spatial import sides, with_friction
 from solver.spatial import virtual_work as spatial_virtual_work
@@ -230,8 +230,8 @@ class ForceEstimator:
         works = self._works(measured, motion)
         lacking = adapter.actuation.forces(measured.tensions - ratio[:, None] * motion.tensions)
         least = LEAST_SLOPE * scales.length_mm / scales.travel_mm * self._sizes(measured)
-        squares = np.maximum(np.maximum(_dot(works, works), least**2), TINY)
-        return np.asarray(np.maximum(_dot(works, lacking), 0.0) / squares)
+        squares = np.maximum(np.maximum(dot(works, works), least**2), TINY)
+        return np.asarray(np.maximum(dot(works, lacking), 0.0) / squares)
 
     def _works(self, measured: Measured, motion: FreeMotion) -> np.ndarray:
         """Return the work of the model's forces at the points that touch, per command, ``(k, commands)`` [N]."""
@@ -261,9 +261,9 @@ class ForceEstimator:
             loads = sides(adapter.layout.cables(blocks)) * measured.tensions - measured.onsets
             return spatial_virtual_work(with_friction(total, slopes[..., :3], friction), loads, slopes)
         assert motion is not None
-        works = -np.stack([_dot(total, motion.tips[:, k]) for k in range(motion.tips.shape[1])], axis=-1)
+        works = -np.stack([dot(total, motion.tips[:, k]) for k in range(motion.tips.shape[1])], axis=-1)
         given = adapter.actuation.forces(loads)
-        return np.asarray(np.maximum(_dot(works, given), 0.0) / np.maximum(_dot(works, works), TINY))
+        return np.asarray(np.maximum(dot(works, given), 0.0) / np.maximum(dot(works, works), TINY))
 
 
 def _straight_lines(adapter: AnyAdapter) -> np.ndarray | None:
@@ -272,14 +272,6 @@ def _straight_lines(adapter: AnyAdapter) -> np.ndarray | None:
     if not isinstance(robot, Robot) or robot.model != "paper" or robot.length_range_mm is not None:
         return None
     return fitted_slopes(robot, 0.0, FITTED * adapter.scales.travel_mm)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return dot products along the last axis, added term by term: the bits do not depend on their number."""
-    total = a[..., 0] * b[..., 0]
-    for k in range(1, a.shape[-1]):
-        total = total + a[..., k] * b[..., k]
-    return np.asarray(total)
 
 
 def _beside(steps: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Scalar and array versions of the same operations, with bit-identical results."""
+"""Operations whose bits do not depend on how many are done at once: scalar and array versions, and dot products."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -24,3 +24,11 @@ class Operations(NamedTuple):
 
 ARRAYS = Operations(np.minimum, np.maximum, np.where)
 NUMBERS = Operations(min, max, lambda condition, yes, no: yes if condition else no)
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return dot products along the last axis, added term by term: the bits do not depend on their number."""
+    total = a[..., 0] * b[..., 0]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., k] * b[..., k]
+    return np.asarray(total)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.common.operations import dot
 from solver.common.validation import check_finite, check_instance
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import sides
@@ -36,9 +37,9 @@ def with_friction(forces: np.ndarray, slopes: np.ndarray, friction: float) -> np
     """
     size = _norm(forces)
     normal = forces / np.maximum(size, TINY)
-    against = -_dot(normal[..., None, :], slopes)  # how each displacement moves the tip into the surface
+    against = -dot(normal[..., None, :], slopes)  # how each displacement moves the tip into the surface
     motion = against[..., :1] * slopes[..., 0, :] + against[..., 1:] * slopes[..., 1, :]
-    slip = motion - _dot(motion, normal)[..., None] * normal
+    slip = motion - dot(motion, normal)[..., None] * normal
     return np.asarray(forces + friction * size * slip / np.maximum(_norm(slip), TINY))
 
 
@@ -52,10 +53,10 @@ def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> n
         loads: Loads of both pairs of cables, signed as their displacements, ``(..., 2)`` [N].
         slopes: Slopes of the free tip in both displacements, as :attr:`SpatialEquilibrium.tip_slopes`, ``(..., 2, 5)``.
     """
-    works = _dot(forces[..., None, :], slopes[..., :3])
-    given = _dot(loads[..., None, :], slopes[..., 3:])
-    balance = _dot(works, given)
-    return np.asarray(np.where(balance < 0, -balance, 0.0) / np.maximum(_dot(works, works), TINY))
+    works = dot(forces[..., None, :], slopes[..., :3])
+    given = dot(loads[..., None, :], slopes[..., 3:])
+    balance = dot(works, given)
+    return np.asarray(np.where(balance < 0, -balance, 0.0) / np.maximum(dot(works, works), TINY))
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,14 +88,5 @@ class SpatialVirtualWork:
         return np.asarray(virtual_work(forces.sum(axis=0), loads, slopes) * forces)
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return dot products along the last axis, summed term by term: the bits do not depend on the batch size."""
-    product = a * b
-    total = product[..., 0]
-    for k in range(1, product.shape[-1]):
-        total = total + product[..., k]
-    return np.asarray(total)
-
-
 def _norm(a: np.ndarray) -> np.ndarray:
-    return np.asarray(np.sqrt(_dot(a, a))[..., None])
+    return np.asarray(np.sqrt(dot(a, a))[..., None])
