@@ -48,7 +48,8 @@ def _sensing(sensing: str) -> str:
     if sensing == "ideal":
         return sensing
     ranges = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in asdict(Sensing()).items())
-    return f"{ranges} (forces in EI/L², play in the offset a of the cables, latency in steps)"
+    units = "forces in EI/L², tensions in EI/(aL), play in a, places in L, angles in rad, latency in steps"
+    return f"{ranges} ({units})"
 
 
 def _result(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:
