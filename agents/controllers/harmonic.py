@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.controllers.mpc import SMALLEST, PredictiveController
+from agents.controllers.mpc import PredictiveController
 
 PERIODS = np.arange(14.0, 57.0, 1.0)  # candidates [steps]
 OVERTONES = 2  # of the motion
@@ -27,14 +27,9 @@ class HarmonicController(PredictiveController):
 
     name: str = "Harmonic"
 
-    def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:
-        series = self._series(cable, len(goals)) if len(self._readings) > ENOUGH else None
-        if series is None:
-            return PredictiveController._move(self, cable, increment, goals)
-        force, slope, ahead = series
-        slope = max(slope, self.settings.least_slope)
-        move = increment * self._plan(slope * increment, force, goals - ahead)
-        return 0.0 if abs(slope * move) < SMALLEST else move
+    def _forecast(self, cable: float, horizon: int) -> tuple[float, float, np.ndarray]:
+        series = self._series(cable, horizon) if len(self._readings) > ENOUGH else None
+        return PredictiveController._forecast(self, cable, horizon) if series is None else series
 
     def _series(self, cable: float, horizon: int) -> tuple[float, float, np.ndarray] | None:
         """Return force and slope at a place now, and what the series adds in the next steps, ``(horizon,)``.
@@ -44,7 +39,7 @@ class HarmonicController(PredictiveController):
         cables, forces = np.array(self._readings[-WINDOW:]).T
         since = np.array(self._steps[-WINDOW:]) - self._step
         prior = self._curve(cable)[1]
-        best = None
+        level, best = forces - prior * (cables - cable), None
         for period in PERIODS[-since[0] > PERIODS * CYCLES]:
             weights = np.exp(since / (MEMORY * period))
             columns = np.column_stack([np.ones(len(since)), cables - cable, _waves(since, period)])
@@ -52,13 +47,10 @@ class HarmonicController(PredictiveController):
             target = columns.T @ (weights * forces) + ridge * np.array([0.0, prior, *[0.0] * (columns.shape[1] - 2)])
             found = np.linalg.solve(columns.T @ (weights[:, None] * columns) + np.diag(ridge), target)
             left = forces - columns @ found
-            level = forces - prior * (cables - cable)
             alone = weights @ (level - weights @ level / weights.sum()) ** 2
             misfit = float(weights @ left**2 / max(alone, 1e-12))
             if best is None or misfit < best[0]:
                 best = misfit, found, period
-        if best is None or misfit < best[0]:
-            best = misfit, found, period
         if best is None or best[0] > EXPLAINED:
             return None
         _, (force, slope, *amplitudes), period = best

@@ -72,10 +72,14 @@ class PredictiveController:
 
     def _move(self, cable: float, increment: float, goals: np.ndarray) -> float:
         """Return the first move of a plan from a cable displacement [a], 0 where it adds too little force."""
-        force, slope = self._curve(cable)
+        force, slope, ahead = self._forecast(cable, len(goals))
         slope = max(slope, self.settings.least_slope)
-        move = increment * self._plan(slope * increment, force, goals)
+        move = increment * self._plan(slope * increment, force, goals - ahead)
         return 0.0 if abs(slope * move) < SMALLEST else move
+
+    def _forecast(self, cable: float, horizon: int) -> tuple[float, float, np.ndarray]:
+        """Return force and slope at a displacement, and what coming steps add without a move, ``(horizon,)``."""
+        return *self._curve(cable), np.zeros(horizon)
 
     def _curve(self, cable: float) -> tuple[float, float]:
         """Return force [EI/L²] and slope [EI/L² per a] at a displacement, from a weighted fit through the readings.
