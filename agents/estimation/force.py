@@ -8,9 +8,9 @@ from agents.environment import EnvIndex
 from ccr_gym import Sensing
 
 DRIFT = 0.5  # change of the error of virtual work over the change of the force, per step
+LEAST_DRIFT = 0.01  # of such a change [EI/L²]
 LEAST_NOISE = 1e-3  # of the sensor, where it has none [EI/L²]
 CORRECTED = 0.03  # standard deviation of a corrected force, over the force: a late reading is of another place
-LEAST_DRIFT = 0.01  # of such a change [EI/L²]
 
 
 class ForceFilter:

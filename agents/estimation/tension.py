@@ -16,7 +16,7 @@ RIGIDITY = 1.0, 1.0  # mean and standard deviation of the prior of the rigidity 
 SMOOTHNESS = 0.9  # weight of the past in the lines through tensions in contact, per step
 SLIP = 0.02  # standard deviation of a tension in contact from such a line, over the tension
 COUNTED = 0.5  # share of the evidence before contact that counts, as the nominal tension is only nearly known
-TRUST = 0.1  # share of that evidence that counts, as errors of neighbouring steps are alike
+TRUST = 0.1  # share of the evidence in contact that counts, as errors of neighbouring steps are alike
 LEAST = 1e-3  # of standard deviations, for candidates without noise [EI/(aL)]
 
 
