@@ -179,6 +179,10 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
 
     settings_class, space, turns = Settings, 2, 1
 
+    def __init__(self, settings: PlanarSettingsT, layout: Layout) -> None:
+        super().__init__(settings, layout)
+        self._pose_scale = 1 / np.array([*2 * [settings.reach_mm], np.pi])  # of x, y and disk angle
+
     @classmethod
     def make_batch(cls, settings: PlanarSettingsT, count: int, obstacles: int, threads: int) -> BaseBatch:
         """Return a batch of the native solver, or of the reference solver."""
@@ -200,15 +204,12 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
         """Return position and disk angle of every node."""
         robot = self.settings.robot
         nodes = self.layout.nodes(np.arange(self.layout.size)).ravel()
-        return {"nodes": Feature(nodes, np.tile(self._pose_scale(), robot.segments + 1))}
+        return {"nodes": Feature(nodes, np.tile(self._pose_scale, robot.segments + 1))}
 
     def disturb_pose(self, entries: Mapping[str, np.ndarray], errors: np.ndarray) -> None:
         """Add errors to positions and disk angles; see the base class."""
         nodes = entries["nodes"]
-        nodes += (errors * self._pose_scale()).reshape(nodes.shape)
-
-    def _pose_scale(self) -> np.ndarray:
-        return 1 / np.array([*2 * [self.settings.reach_mm], np.pi])
+        nodes += (errors * self._pose_scale).reshape(nodes.shape)
 
 
 class InsertionAdapter(PlanarAdapter[InsertionSettings]):

@@ -61,6 +61,18 @@ class FreeMotion(NamedTuple):
     tips: np.ndarray
 
 
+class Pressing(NamedTuple):
+    """The nominal model's forces at the points that touch.
+
+    Attributes:
+        works: Their work per command, ``(k, commands)`` [N].
+        sizes: Their magnitudes, added over the obstacles, ``(k,)`` [N].
+    """
+
+    works: np.ndarray
+    sizes: np.ndarray
+
+
 class FreeRobots:
     """N robots that nothing touches, each with companions that are pulled a little less by one command each.
 
@@ -200,22 +212,26 @@ class ForceEstimator:
         indices, touching = indices[wanted], touching[wanted]
         measured = Measured(*(entry[wanted] for entry in measured))
         motion = None if self._free is None else self._free.move(indices, measured.actuated_mm)
-        if self.learns and motion is not None:
+        pressing = None if motion is None else self._pressing(measured, motion)
+        if self.learns and motion is not None and pressing is not None:
             self._learn(indices, measured, motion, touching)
             self.free_forces[indices] = self._adapter.actuation.forces(motion.tensions)
-            self.levers[indices] = self._works(measured, motion) / np.maximum(self._sizes(measured), TINY)[:, None]
+            self.levers[indices] = pressing.works / np.maximum(pressing.sizes, TINY)[:, None]
         self.paper[indices] = self._paper_factors(measured, motion)
-        self.chosen[indices] = self._chosen_factors(indices, measured, motion)
+        self.chosen[indices] = self._chosen_factors(indices, measured, motion, pressing)
 
     def probe(self, measured: Measured) -> np.ndarray:
         """Return the factors of the estimate that is observed for all robots elsewhere, ``(N,)``; nothing moves."""
         motion = None if self._free is None else self._free.probe(measured.actuated_mm)
-        return self._chosen_factors(np.arange(len(self.chosen)), measured, motion)
+        pressing = None if motion is None else self._pressing(measured, motion)
+        return self._chosen_factors(np.arange(len(self.chosen)), measured, motion, pressing)
 
-    def _chosen_factors(self, robots: np.ndarray, measured: Measured, motion: FreeMotion | None) -> np.ndarray:
-        if not self._contact or motion is None:
+    def _chosen_factors(
+        self, robots: np.ndarray, measured: Measured, motion: FreeMotion | None, pressing: Pressing | None
+    ) -> np.ndarray:
+        if not self._contact or motion is None or pressing is None:
             return self._paper_factors(measured, motion)
-        return self._contact_factors(measured, motion, self._products[robots] / self._squares[robots])
+        return self._contact_factors(measured, motion, pressing, self._products[robots] / self._squares[robots])
 
     def _learn(self, robots: np.ndarray, measured: Measured, motion: FreeMotion, touching: np.ndarray) -> None:
         """Learn the rigidity over its nominal value from robots that nothing touches."""
@@ -224,26 +240,25 @@ class ForceEstimator:
         fit = fit.updated(measured.tensions, motion.tensions, touching, noise)
         self._products[robots], self._squares[robots] = fit.products, fit.squares
 
-    def _contact_factors(self, measured: Measured, motion: FreeMotion, ratio: np.ndarray) -> np.ndarray:
+    def _contact_factors(
+        self, measured: Measured, motion: FreeMotion, pressing: Pressing, ratio: np.ndarray
+    ) -> np.ndarray:
         """Return the factors for which forces do the work at the points that touch that the cables lack, ``(k,)``."""
         adapter, scales = self._adapter, self._adapter.scales
-        works = self._works(measured, motion)
+        works = pressing.works
         lacking = adapter.actuation.forces(measured.tensions - ratio[:, None] * motion.tensions)
-        least = LEAST_SLOPE * scales.length_mm / scales.travel_mm * self._sizes(measured)
+        least = LEAST_SLOPE * scales.length_mm / scales.travel_mm * pressing.sizes
         squares = np.maximum(np.maximum(dot(works, works), least**2), TINY)
         return np.asarray(np.maximum(dot(works, lacking), 0.0) / squares)
 
-    def _works(self, measured: Measured, motion: FreeMotion) -> np.ndarray:
-        """Return the work of the model's forces at the points that touch, per command, ``(k, commands)`` [N]."""
+    def _pressing(self, measured: Measured, motion: FreeMotion) -> Pressing:
+        """Return how the model's forces work at the points that touch."""
         forces = self._adapter.layout.forces(measured.blocks)
         multipliers = self._adapter.layout.multipliers(measured.blocks)
         shares = multipliers / np.maximum(multipliers.sum(axis=(-2, -1), keepdims=True), TINY)
         pressed = np.sum(shares[..., None] * forces[:, :, None, None], axis=1)
-        return np.asarray(-np.sum(pressed[:, None] * motion.points, axis=(-3, -2, -1)))
-
-    def _sizes(self, measured: Measured) -> np.ndarray:
-        """Return the magnitudes of the model's forces, added over the obstacles, ``(k,)`` [N]."""
-        return np.asarray(np.linalg.norm(self._adapter.layout.forces(measured.blocks), axis=-1).sum(axis=-1))
+        works = -np.sum(pressed[:, None] * motion.points, axis=(-3, -2, -1))
+        return Pressing(works, np.linalg.norm(forces, axis=-1).sum(axis=-1))
 
     def _paper_factors(self, measured: Measured, motion: FreeMotion | None) -> np.ndarray:
         """Return the factors for which the forces at the free tip do the work of the loads since onset, ``(k,)``."""
