@@ -9,7 +9,7 @@ from gymnasium import spaces
 from ccr_gym.adapters import AnyAdapter
 from ccr_gym.observation import Observer
 from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SPAN, SUCCESS_ERROR
-from ccr_gym.scales import AHEAD, RADIUS_SPAN, TENSION_SPAN
+from ccr_gym.scales import AHEAD, RADIUS_SPAN
 from ccr_gym.settings import AnySettings
 from ccr_gym.task import AnyTask
 from ccr_gym.tasks import LEVELS
@@ -40,7 +40,9 @@ def describe(task: AnyTask, title: str, description: str, start: str, *, action:
 
 {_table(task, adapter, settings)}
 
-            Without `force_sensor` the keys `force_error` and `force_measured` are absent.""",
+            Without a force sensor the keys `force_error` and `force_measured` are absent. Where sensing is not ideal
+            there are `tension`, of each cable as a load cell at its motor reads it, and `free_tension` and `lever` of
+            the nominal model; with `randomize` there is `robot`.""",
         "Rewards": _rewards(settings, adapter.space),
         "Starting State": start.format(**_field_texts(task))
         + f""" Lengths are multiples of the robot's length L, here {settings.scales.length_mm:g} mm, and forces of
@@ -123,7 +125,6 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
     """Return meaning and scale of an entry of the observation."""
     robot, force = settings.robot, f"{settings.force_span * settings.scales.force_n:.3g} N"
     planar, space = isinstance(robot, Robot), task.adapter.space
-    tension = f"{TENSION_SPAN * settings.scales.tension_n:.3g} N"
     radius = RADIUS_SPAN * settings.scales.length_mm
     lines = ", ".join(robot.touch) if planar else "backbone, first and second hole, opposite holes"
     length = f"{max(robot.lengths_mm) if isinstance(robot, Robot) else robot.length_mm:g} mm"
@@ -143,12 +144,6 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
             if planar
             else ("x, y, z of nodes 0…n, node by node", length)
         ),
-        "free_tension": ("tension that the nominal robot needs where nothing touches it, of each command", tension),
-        "lever": (
-            "motion of the points that touch against the force, per command",
-            f"L/a = {settings.scales.length_mm / settings.scales.travel_mm:.3g}",
-        ),
-        "tension": ("tension of each cable, as a load cell at its motor reads it", tension),
         "obstacle": (
             "centre x, y, z; axis of a cylinder, else 0; radius",
             f"{length}, 1, {radius:g} mm",
