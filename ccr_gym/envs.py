@@ -83,12 +83,12 @@ class TrackForceEnv(TaskEnv):  # noqa: D101 - below
     task_class = TrackForce
     __doc__ = describe(
         TrackForce(),
-        "Push a circular obstacle with a force that steps and swings.",
+        "Push a circular obstacle with a force that changes and swings.",
         "As `PushObstacle`, but the set-point moves: it swings about a level that changes several times in an "
         "episode. It is previewed, so that an agent that knows its robot can follow without delay.",
-        CIRCLE + ", which is the largest of the episode. Its level changes {jumps} times, at uniform times, to "
-        "{levels} of the largest before scaling; the amplitude of the swing is {swing} of the level, its period "
-        "{period} steps." + FEASIBLE,
+        CIRCLE + ", which is the largest of the episode. Its level changes {changes} times, at uniform times and over "
+        "{ramp} steps each, to {levels} of the largest before scaling; the amplitude of the swing is {swing} of the "
+        "level, its period {period} steps." + FEASIBLE,
     )
 
 

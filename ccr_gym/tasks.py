@@ -80,10 +80,11 @@ class PushObstacle(Task[Robot]):
 
 @dataclass(frozen=True, slots=True)
 class TrackForce(PushObstacle):
-    """A circular obstacle, and a set-point that steps and swings and is previewed.
+    """A circular obstacle, and a set-point that changes its level, swings, and is previewed.
 
     Attributes:
-        jumps: Number of level changes of the set-point in an episode.
+        changes: Number of level changes of the set-point in an episode.
+        ramp: Steps that a change of level takes; more than the robot needs, so that its controller decides the error.
         swing: Range of the amplitude of its swing, as a fraction of the level; below 1 to keep the set-point positive.
         period: Range of the period of its swing [steps].
     """
@@ -91,7 +92,8 @@ class TrackForce(PushObstacle):
     moving: ClassVar[bool] = True
     steps: ClassVar[int] = PROFILE_STEPS
 
-    jumps: int = checked(3, check_whole, low=0, high=PROFILE_STEPS)
+    changes: int = checked(3, check_whole, low=0, high=PROFILE_STEPS)
+    ramp: int = checked(16, check_whole, low=1, high=PROFILE_STEPS)
     swing: Range = checked((0.1, 0.4), check_range, low=0, below=1)
     period: Range = checked((24.0, 64.0), check_range, low=1)
 
@@ -99,10 +101,12 @@ class TrackForce(PushObstacle):
         """Return a circle, the largest set-point of the episode, and its profile."""
         sampled = PushObstacle.sample(self, robot, generator)
         swing, period, phase, _ = uniform(generator, self.swing, self.period, (0.0, 2 * math.pi), (0.0, 1.0))
-        times = np.sort(generator.uniform(0, PROFILE_STEPS, self.jumps))
-        levels = generator.uniform(*LEVELS, self.jumps + 1)
+        times = np.sort(generator.uniform(0, PROFILE_STEPS, self.changes))
+        levels = generator.uniform(*LEVELS, self.changes + 1)
+        level = levels[np.searchsorted(times, np.arange(1 - self.ramp, PROFILE_STEPS))]
+        ramps = np.convolve(level, np.full(self.ramp, 1 / self.ramp), "valid")  # a jump becomes a ramp
         now = np.arange(PROFILE_STEPS)
-        profile = levels[np.searchsorted(times, now)] * (1 + swing * np.sin(2 * math.pi * now / period + phase))
+        profile = ramps * (1 + swing * np.sin(2 * math.pi * now / period + phase))
         return sampled._replace(profile=profile / profile.max())
 
 

@@ -10,13 +10,14 @@ from ccr_gym import Sensing
 DRIFT = 0.5  # change of the error of virtual work over the change of the force, per step
 LEAST_DRIFT = 0.01  # of such a change [EI/L²]
 LEAST_NOISE = 1e-3  # of the sensor, where it has none [EI/L²]
+EXPECTED = 6.0  # readings that the expected noise of the sensor is worth
 CORRECTED = 0.03  # standard deviation of a corrected force, over the force: a late reading is of another place
 
 
 class ForceFilter:
     """Follows the difference between sensor and virtual work of many robots, as a random walk.
 
-    The zero of the sensor is the mean of its readings before contact.
+    The zero and the noise of the sensor are mean and deviation of its readings before contact.
 
     Args:
         count: Number N of robots.
@@ -27,15 +28,15 @@ class ForceFilter:
 
     def __init__(self, count: int, sensing: Sensing, latency: int, span: float) -> None:
         self._span = span
-        self._noise = max(sensing.force_noise[1], LEAST_NOISE) ** 2
+        self._expected = max(float(np.mean(sensing.force_noise)), LEAST_NOISE) ** 2
         self._steps = 2 * sensing.force_resolution[1] ** 2 / 12  # of the zero as well; it does not average out
-        self._zero, self._readings = np.zeros((count, 3)), np.zeros(count)
+        self._zero, self._squares, self._readings = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
         self._past = np.zeros((count, latency + 2))  # forces of virtual work, the present one first
         self._shift, self._spread = np.zeros(count), np.full(count, np.inf)
 
     def reset(self, index: EnvIndex) -> None:
         """Start new episodes of some robots."""
-        for part in (self._zero, self._readings, self._past, self._shift):
+        for part in (self._zero, self._squares, self._readings, self._past, self._shift):
             part[index] = 0.0
         self._spread[index] = np.inf
 
@@ -72,8 +73,9 @@ class ForceFilter:
     def _note_zero(self, measured: np.ndarray, free: np.ndarray, index: EnvIndex) -> None:
         readings = self._readings[index] + free
         zero, size = self._zero[index], measured.shape[1]
-        shift = (measured - zero[:, :size]) / np.maximum(readings, 1.0)[:, None]
-        zero[:, :size] += np.where(free[:, None], shift, 0.0)
+        away = np.where(free[:, None], measured - zero[:, :size], 0.0)
+        zero[:, :size] += away / np.maximum(readings, 1.0)[:, None]
+        self._squares[index] += np.where(readings > 1, (away * (measured - zero[:, :size])).mean(axis=1), 0.0)
         self._zero[index], self._readings[index] = zero, readings
 
     def _correct(
@@ -91,7 +93,8 @@ class ForceFilter:
         spread = np.minimum(self._spread[index] + (DRIFT * change) ** 2 + LEAST_DRIFT**2, variance)
         shift = np.where(np.isinf(self._spread[index]), 0.0, self._shift[index])
         known = touching & (then > 0)
-        noise = self._noise * (1 + 1 / np.maximum(self._readings[index], 1.0))
+        readings = np.maximum(self._readings[index], 1.0)
+        noise = (EXPECTED * self._expected + self._squares[index]) / (EXPECTED + readings - 1) * (1 + 1 / readings)
         gain = np.where(known, spread / (spread + noise), 0.0)
         shift = shift + gain * (size - then - shift)
         spread = (1 - gain) * spread
