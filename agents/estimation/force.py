@@ -7,11 +7,11 @@ import numpy as np
 from agents.environment import EnvIndex
 from ccr_gym import Sensing
 
-DRIFT = 0.5  # change of the error of virtual work over the change of the force, per step
-LEAST_DRIFT = 0.01  # of such a change [EI/L²]
+DRIFT = 0.2  # change of the error of virtual work over the change of the force, per step
+LEAST_DRIFT = 0.01  # of such a change, over the force
 LEAST_NOISE = 1e-3  # of the sensor, where it has none [EI/L²]
 EXPECTED = 6.0  # readings that the expected noise of the sensor is worth
-CORRECTED = 0.03  # standard deviation of a corrected force, over the force: a late reading is of another place
+CORRECTED = 0.05  # standard deviation of a corrected force, over the force: a late reading is of another place
 
 
 class ForceFilter:
@@ -87,18 +87,29 @@ class ForceFilter:
         touching: np.ndarray,
         index: EnvIndex,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corrected force and its standard deviation."""
-        size = np.linalg.norm(measured - self._zero[index][:, : measured.shape[1]], axis=1)
+        """Return the corrected force and its standard deviation.
+
+        What the sensor differs from virtual work by is the error of either: that of its zero, which stays, and that of
+        virtual work. The difference is followed, and shared out by their variances.
+        """
         change = self._past[index][:, 0] - self._past[index][:, 1]
-        spread = np.minimum(self._spread[index] + (DRIFT * change) ** 2 + LEAST_DRIFT**2, variance)
-        shift = np.where(np.isinf(self._spread[index]), 0.0, self._shift[index])
-        known = touching & (then > 0)
         readings = np.maximum(self._readings[index], 1.0)
-        noise = (EXPECTED * self._expected + self._squares[index]) / (EXPECTED + readings - 1) * (1 + 1 / readings)
-        gain = np.where(known, spread / (spread + noise), 0.0)
-        shift = shift + gain * (size - then - shift)
-        spread = (1 - gain) * spread
+        noise = (EXPECTED * self._expected + self._squares[index]) / (EXPECTED + readings - 1)
+        zero = noise / readings + self._steps
+        size = _length(measured - self._zero[index][:, : measured.shape[1]], noise)
+        drift = (DRIFT * change) ** 2 + (LEAST_DRIFT * force) ** 2
+        spread = np.minimum(self._spread[index] + drift, variance + zero)
+        shift = np.where(np.isinf(self._spread[index]), 0.0, self._shift[index])
+        gain = np.where(touching & (then > 0), spread / (spread + noise), 0.0)
+        shift, spread = shift + gain * (size - then - shift), (1 - gain) * spread
         self._shift[index], self._spread[index] = np.where(touching, shift, 0.0), np.where(touching, spread, np.inf)
-        force = np.maximum(force + shift, 0.0)
-        deviation = np.sqrt(spread + self._steps + (CORRECTED * force) ** 2)
+        share = variance / (variance + zero)
+        force = np.maximum(force + share * shift, 0.0)
+        deviation = np.sqrt(share**2 * spread + share * zero + (CORRECTED * force) ** 2)
         return np.where(touching, force, 0.0), np.where(touching, deviation, 0.0)
+
+
+def _length(vectors: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Return the lengths of noisy vectors ``(k, d)``, less what the noise across them adds on average."""
+    squares = (vectors**2).sum(axis=1) - (vectors.shape[1] - 1) * variance
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
