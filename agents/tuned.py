@@ -67,7 +67,7 @@ class MPCSettings:
 
     horizon: int = 8
     """Steps of a plan."""
-    effort: float = 0.05
+    effort: float = 0.1
     """Weight of the squared force change of each move, relative to the squared force errors."""
     slope: float = 4.0
     """Slope of the force over the cable that is assumed at first [EI/L² per a]."""
@@ -77,7 +77,7 @@ class MPCSettings:
     """Weight of the assumed slope in the fit, as a squared distance [a²]."""
     stiffening: float = 2.0
     """Relative growth of the slope with the cable [1/a]."""
-    width: float = 0.025
+    width: float = 0.05
     """Standard deviation of the weight of a reading over its distance [a]."""
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.connection import wait
+from threading import Thread
 
 from agents.errors import UserError
 
@@ -16,7 +18,7 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of single-threaded processes, which are killed if the block fails or is interrupted.
 
     One thread each is fastest for small matrices, and by far where every core has a process of its own. The workers
-    ignore interrupts; this process handles them.
+    ignore interrupts; this process handles them. If it is killed, they end as well.
 
     Raises:
         UserError: If one of them dies.
@@ -45,3 +47,10 @@ def _start(pool: ProcessPoolExecutor, count: int) -> None:
     for _ in range(count):
         pool.submit(int)
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as its parent has died, which nobody else would tell it."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "workers have a parent"
+    Thread(target=lambda: (wait([parent.sentinel]), os._exit(1)), daemon=True).start()

@@ -87,17 +87,23 @@ class PredictiveController:
         The curve stiffens at an assumed rate κ: ``F + F' (exp(κ d) − 1) / κ`` at a distance d. The assumed slope enters
         the fit as one more reading.
         """
-        cables, forces = np.array(self._readings).T
-        away, rate, trust = cables - cable, self.settings.stiffening, self.settings.trust
-        width = self.settings.width + np.abs(away).min()
-        weights = np.exp(-0.5 * (away / width) ** 2)
-        shape = np.expm1(rate * away) / rate
+        away, forces = np.array(self._readings).T - [[cable], [0.0]]
+        trust, weights, shape = self.settings.trust, self._nearness(away), self._bend(away)
         cross = weights @ shape
         matrix = np.array([[weights.sum(), cross], [cross, weights @ shape**2 + trust]])
         force, slope = np.linalg.solve(
             matrix, [weights @ forces, weights @ (shape * forces) + trust * self.settings.slope]
         )
         return float(force), float(slope)
+
+    def _nearness(self, away: np.ndarray) -> np.ndarray:
+        """Return the weights of readings at distances [a]."""
+        width = self.settings.width + np.abs(away).min()
+        return np.asarray(np.exp(-0.5 * (away / width) ** 2))
+
+    def _bend(self, away: np.ndarray) -> np.ndarray:
+        """Return what the force adds at distances [a], over its slope [a]."""
+        return np.asarray(np.expm1(self.settings.stiffening * away) / self.settings.stiffening)
 
     def _plan(self, gain: float, force: float, goals: np.ndarray) -> float:
         """Return the first move of a plan, in full increments."""

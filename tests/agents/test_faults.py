@@ -242,3 +242,31 @@ def test_a_finished_run_says_so_and_ends_well(tmp_path, monkeypatch, capsys):
 def test_a_worker_that_dies_is_reported():
     with pytest.raises(UserError, match="a worker process was killed"), worker_pool(1) as pool:
         pool.submit(os._exit, 1).result()
+
+
+def test_workers_end_with_a_killed_parent(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import os, time\n"
+        "from agents.workers import worker_pool\n"
+        "if __name__ == '__main__':\n"
+        "    with worker_pool(1) as pool:\n"
+        "        print(pool.submit(os.getpid).result(), flush=True)\n"
+        "        pool.submit(time.sleep, 60).result()\n"
+    )
+    process = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
+    worker = int(process.stdout.readline())
+    process.kill()
+    process.communicate()
+    for _ in range(100):
+        if _has_ended(worker):
+            return
+        time.sleep(0.1)
+    os.kill(worker, signal.SIGKILL)
+    pytest.fail("the worker outlived its parent by 10 s")
+
+
+def _has_ended(process):
+    """Return whether a process has ended; one whom no parent has waited for yet is still listed."""
+    status = Path(f"/proc/{process}/stat")
+    return not status.exists() or status.read_text().rpartition(")")[2].split()[0] == "Z"
