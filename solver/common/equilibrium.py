@@ -220,7 +220,7 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
         return unknowns, parameters, _tensions(balance, equality_slopes), self.inequality_multipliers
 
     def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
-        return [value.full() for value in self._derivatives(unknowns, parameters)]
+        return [_full(value) for value in self._derivatives(unknowns, parameters)]
 
     def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Return the objective's slope less the contact forces, and the slopes of the equalities that balance it."""
@@ -278,6 +278,13 @@ def _check_block(block: np.ndarray, layout: Layout, robot: AnyRobot) -> None:
             raise ValueError(f"{name} in block is {np.abs(part).max():.6g}; it must be at most {bound:.6g}: {remedy}")
     if layout.multipliers(block).min(initial=0.0) < 0:
         raise ValueError(f"a multiplier in block is negative; none may be: {remedy}")
+
+
+def _full(matrix: ca.DM) -> np.ndarray:
+    """Return a sparse matrix as an array; ``matrix.full()`` would take long over its many zeros."""
+    full, sparsity = np.zeros(matrix.shape), matrix.sparsity()
+    full[sparsity.get_triplet()] = matrix.nonzeros()
+    return full
 
 
 def _tensions(balance: np.ndarray, equality_slopes: np.ndarray) -> np.ndarray:
