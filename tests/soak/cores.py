@@ -49,7 +49,7 @@ class CoreCheck:
     """
 
     def __init__(self, robot, scene):
-        self.edges = robot.edges_mm
+        self.edges = np.array(robot.edges_mm)
         cored = [obstacle.nodes is None and math.isfinite(obstacle.extent.radius) for obstacle in scene]
         self.obstacles = [(j, obstacle) for j, obstacle in enumerate(scene) if cored[j]]
         self.planar = not scene.obstacles or scene.obstacles[0].space == 2
@@ -64,13 +64,14 @@ class CoreCheck:
             linked: Which neighbouring shapes belong to the same motion, ``(k-1,)`` bool.
         """
         swept = np.zeros((len(points) - 1, displacements.shape[1]), bool)
-        for line, longest in enumerate(self.edges):
-            for j, obstacle in self.obstacles:
-                seen = points[:, line] - displacements[:, None, j]
-                close = linked & _close(obstacle, seen, longest)
-                if close.any():
-                    before, after = seen[:-1][close], seen[1:][close]
-                    swept[close, j] |= self._is_swept(j, obstacle, before, after, longest)
+        low, high = points.min(axis=2), points.max(axis=2)
+        for j, obstacle in self.obstacles:
+            moved = displacements[:, j]
+            near = _reaches(obstacle, low - moved[:, None], high - moved[:, None]) & np.transpose([linked])
+            for line in np.flatnonzero(near.any(axis=0)):
+                steps = np.flatnonzero(near[:, line])
+                before, after = (points[k, line] - moved[k, None] for k in (steps, steps + 1))
+                swept[steps, j] |= self._is_swept(j, obstacle, before, after, self.edges[line])
         return swept
 
     def _is_swept(self, j, obstacle, before, after, longest):
@@ -105,14 +106,21 @@ def _candidates(obstacle):
     return points, depth(obstacle, points)
 
 
-def _close(obstacle, line, longest):
-    """Return whether any edge of a line ``(k, n, d)`` may have come near an obstacle, ``(k-1,)``."""
+def _reaches(obstacle, low, high):
+    """Return whether the box around lines before and after a motion meets the ball around an obstacle, ``(k-1, p)``.
+
+    In a straight motion, points stay in the box.
+
+    Args:
+        obstacle: The obstacle.
+        low: Least coordinates of lines, ``(k, p, d)`` [mm].
+        high: Largest ones.
+    """
     center, radius = obstacle.extent[:2]
-    offset = line - np.array(center)
-    nearest = np.sqrt((offset * offset).sum(axis=-1).min(axis=1))
-    way = np.diff(line, axis=0)
-    motion = np.sqrt((way * way).sum(axis=-1).max(axis=1))
-    return np.minimum(nearest[:-1], nearest[1:]) < radius + longest / 2 + motion
+    below = np.minimum(low[:-1], low[1:]) - np.array(center)
+    above = np.array(center) - np.maximum(high[:-1], high[1:])
+    outside = np.maximum(np.maximum(below, above), 0)
+    return (outside * outside).sum(axis=-1) <= radius * radius
 
 
 def _deepest_patch(obstacle, before, after, longest):

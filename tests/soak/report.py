@@ -45,7 +45,6 @@ class Tally:
         states = walk.states[1:]
         return cls(
             steps=len(states),
-            contact=sum(bool(state.contact.any()) for state in states),
             statuses=Counter(Status(state.status).name for state in states),
             kinds=Counter({setting.kind: len(states)}),
             refused=setting.refused,

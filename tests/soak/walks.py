@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from soak.cores import line_points
 from soak.drives import drives_of
 from solver import Robot
 
@@ -15,6 +16,44 @@ class Walk(NamedTuple):
 
     states: list
     commands: np.ndarray  # (T, cables + 1) [mm], the length last
+
+
+class Numbers(NamedTuple):
+    """Numbers of the states of a walk, read from all of their blocks at once.
+
+    Attributes:
+        blocks: The blocks, ``(k, size)``.
+        work: Factorisations, ``(k,)``.
+        gaps: Gaps, ``(k, m, p, positions)`` [mm].
+        touching: Whether any point touches an obstacle, ``(k,)`` bool.
+        tensions: Tensions of the cables, ``(k, c)`` [N].
+        points: The points that can touch, ``(k, p, positions, d)`` [mm].
+        displacements: Displacements of the obstacles, ``(k, m, d)`` [mm].
+    """
+
+    blocks: np.ndarray
+    work: np.ndarray
+    gaps: np.ndarray
+    touching: np.ndarray
+    tensions: np.ndarray
+    points: np.ndarray
+    displacements: np.ndarray
+
+    @classmethod
+    def of(cls, states):
+        """Return the numbers of states of one robot and scene."""
+        robot, layout = states[0].robot, states[0]._layout
+        blocks = np.stack([state.block for state in states])
+        frames = None if isinstance(robot, Robot) else layout.frames(blocks)
+        return cls(
+            blocks=blocks,
+            work=np.array([state.factorizations for state in states]),
+            gaps=layout.gaps(blocks),
+            touching=(layout.multipliers(blocks) > 0).any(axis=(1, 2, 3)),
+            tensions=layout.tensions(blocks),
+            points=line_points(robot, layout.nodes(blocks), frames),
+            displacements=layout.displacements(blocks),
+        )
 
 
 def walk(solver, increments):
