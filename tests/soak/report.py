@@ -51,6 +51,11 @@ class Tally:
             certificates_each=20 if model in SPATIAL else 1000,
         )
 
+    @classmethod
+    def load(cls, entries):
+        """Return the tally of its attributes as stored in JSON."""
+        return cls(**{name: Counter(entry) if isinstance(entry, dict) else entry for name, entry in entries.items()})
+
     def add(self, other):
         """Add another tally to this one."""
         for name in (entry.name for entry in fields(self)):
