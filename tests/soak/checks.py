@@ -14,6 +14,7 @@ from solver import Robot, Status
 FAR = 0.5  # of the shortest edge: a step that moves a point farther is checked between its accepted shapes
 CERTIFY_EVERY = 1000
 MOST_FACTORIZATIONS = 5000
+WORK = 4500  # factorisations: a step that was given up on after more has spent its budget, as its trace would tell
 MOST_REPEATED = 30  # cases of an episode whose commands are repeated, which takes long
 SAME_PLACE = 1e-4  # of the offset and the robot's length: steps given up on there
 SAME_WAY = 0.1  # distance of unit vectors to their commands: and in this direction are one case
@@ -198,7 +199,7 @@ def _reason(solver, taken, k, repeats=REPEATS):
     each other so much that segments bend to and fro, from pattern to pattern in many small snaps.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
-    reason = _trace(solver, taken.states[k], command).reason
+    reason = "work" if state.factorizations > WORK else _trace(solver, taken.states[k], command).reason
     if reason == "folded":
         return reason
     near_zero = PRETENSION * robot.offset_mm
