@@ -201,8 +201,7 @@ class SpatialRobot:
     @property
     def lines(self) -> int:
         """Number of lines of points."""
-        counts = {"backbone": 1, "holes": len(self.cable_holes_mm), "rim": self.rim_points}
-        return sum(counts[line] for line in self.touch)
+        return len(self.lines_mm)
 
     @property
     def least_cable_mm(self) -> float:
