@@ -235,7 +235,7 @@ bool Newton<Model>::settle(Iterate& at) {
     advance(at, 1, step_, at);
     for (int j = 0; j < others.count; ++j)
       for (int k = 0; k < at.active.count; ++k)
-        if (at.active.contact[k] == others.contact[j]) at.active.multiplier[k] = others.multiplier[j];
+        if (at.active.contact[k] == others.contact[j]) at.active.multiplier[k] = std::max(0.0, others.multiplier[j]);
   }
   return false;
 }

@@ -74,7 +74,8 @@ class Newton {
   ActiveSet closed_contacts(const ActiveSet& active) const;
   bool gaps_closed(const ActiveSet& active, double tolerance) const;
   void choose_test();
-  bool release_lowest(Iterate& at, ActiveSet& target);
+  bool release_lowest(const Iterate& at, ActiveSet& target);
+  bool slide_along(const ActiveSet& active, ActiveSet& target);
   bool factor_penalized(const ActiveSet& active, int penalties);
   bool factor_stable(const ActiveSet& active, int penalties);
   bool factor_convexified(const ActiveSet& active, int penalties);
