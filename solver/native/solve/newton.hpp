@@ -102,7 +102,8 @@ class Newton {
   double stretch_ = 1;         // of the next damped iterate of this descent
   bool creeping_ = false;      // whether the iterates of this descent hardly move
   double lowest_ = 0;          // energy of this descent when it fell last
-  int flat_ = 0;               // iterates since then
+  int fruitless_ = 0;          // iterates since then,
+  int flat_ = 0;               // and since a saddle was suspected
   int dropped_ = 0;            // iterates that would not be stable without a gap that they drop
 };
 

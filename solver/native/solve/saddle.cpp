@@ -36,9 +36,10 @@ template <class Model>
 bool Newton<Model>::is_flat(const ActiveSet& active) {
   if (problem.energy() < lowest_ - rise_of_roundoff(active)) {
     lowest_ = problem.energy();
-    flat_ = 0;
+    flat_ = fruitless_ = 0;
   } else {
     ++flat_;
+    ++fruitless_;
   }
   return flat_ >= kFlat;
 }
