@@ -247,11 +247,13 @@ bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, d
 }
 
 // A branch that ends within a sub-step from where no descent leads on may go on in finer ones, as where neighbouring
-// contacts wedge the robot and its tension rises steeply. False where it is blocked, folds over, or goes on in none.
+// contacts wedge the robot and its tension rises steeply. False where it is blocked, folds over, or goes on in none:
+// where it has risen beyond what any motion needs, the robot is blocked.
 template <class Model>
 bool ModelContinuation<Model>::refine(Pursuit& pursuit, double size, bool blocked) {
   if (blocked || result_.reason != Reason::kStuck || pursuit.finest <= kTightStep) {
-    pursuit.reached = blocked ? Status::kBlocked : Status::kGaveUp;
+    const bool seized = result_.reason == Reason::kStuck && std::isinf(problem_.robot().max_tension) && is_tight();
+    pursuit.reached = blocked || seized ? Status::kBlocked : Status::kGaveUp;
     return false;
   }
   pursuit.finest = std::max(pursuit.finest * kRefining, kTightStep);
