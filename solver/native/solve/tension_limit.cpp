@@ -29,7 +29,8 @@ void ModelContinuation<Model>::keep_last_held(const Iterate& held) {
 
 // `present_` is below the tension limit, `trial_` above: closes in from below by false position (Illinois), aiming into
 // the middle of the accepted band, with the cables that `trial_` takes beyond the limit: others may be held at it
-// already. False where the branch cannot be followed that far.
+// already. False where the branch cannot be followed that far, unless the tension jumps over the limit within the
+// smallest sub-step, as it may where other cables of a robot that is held tight become taut.
 template <class Model>
 bool ModelContinuation<Model>::approach_tension_limit() {
   const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
@@ -51,7 +52,7 @@ bool ModelContinuation<Model>::approach_tension_limit() {
     const double middle =
         std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
     const Move move = try_command(between(start, end, middle));
-    if (move == Move::kRejected) return false;
+    if (move == Move::kRejected) return width * span <= kSmallestStep;
     if (move == Move::kAccepted) {
       accept();
       low = middle;
