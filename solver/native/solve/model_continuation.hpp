@@ -93,6 +93,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   double pull(const Command& command, int cable) const;
   double command_distance(const Command& a, const Command& b) const;
   double travel(const Command& from, const Command& to) const;
+  bool pulls_in(const Command& command, int cable) const;
   bool pulls_cable(const Command& command) const;
   bool only_releases(const Command& command) const;
   bool moves_obstacles(const Command& command) const { return command.scene != present_.command.scene; }

@@ -76,7 +76,7 @@ bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
   const auto give_up = [&](double tension) {
     bool held = false;
     for (int k = 0; k < kCables; ++k) {
-      if (tensions_[k] < tension || pull(wanted, k) <= pull(present_.command, k)) continue;
+      if (tensions_[k] < tension || !pulls_in(wanted, k)) continue;
       wanted.cables[k] = present_.command.cables[k];
       held = true;
     }
