@@ -133,6 +133,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool pay_out(const Command& command);
   bool hold_stalled_cables(Command& wanted) const;
   bool yield_cables(Command& wanted, double least) const;
+  void wait_for_motors(Command& goal) const;
   bool is_unyielding() const;
   bool is_blocked(const Command& command);
   bool find_holding_set(const Command& command, ActiveSet& holding);

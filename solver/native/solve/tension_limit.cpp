@@ -102,6 +102,13 @@ bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const
   return changed;
 }
 
+// Keeps other cables from being pulled in while motors yield.
+template <class Model>
+void ModelContinuation<Model>::wait_for_motors(Command& goal) const {
+  for (int k = 0; k < kCables; ++k)
+    if (pull(goal, k) > pull(present_.command, k)) goal.cables[k] = present_.command.cables[k];
+}
+
 // Whether a cable that its motor cannot hold has nothing more to let out.
 template <class Model>
 bool ModelContinuation<Model>::is_unyielding() const {
@@ -164,6 +171,7 @@ bool ModelContinuation<Model>::is_blocked(const Command& command) {
   template bool ModelContinuation<Model>::approach_tension_limit();             \
   template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;  \
   template bool ModelContinuation<Model>::yield_cables(Command&, double) const; \
+  template void ModelContinuation<Model>::wait_for_motors(Command&) const;      \
   template bool ModelContinuation<Model>::is_unyielding() const;                \
   template bool ModelContinuation<Model>::is_blocked(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
