@@ -85,6 +85,7 @@ class Transition:
         for robot in [settings.robot] if settings.randomize is None else settings.randomize.corners(settings.robot):
             check_robot(task, robot)
         self._task, self._settings, self.count, self._threads = task, settings, count, threads
+        self._ranges = settings.sensors  # which are made and checked at each access
         self._target, self._vector = task.target, task.force_vector
         self._own = self._make_pipeline(task.obstacles)
         self._trials = Trials(task, settings, self._own.batch, self._own.adapter)
@@ -104,7 +105,7 @@ class Transition:
         self._onsets = np.zeros((count, self.batch.cables))  # those before the model's present contact [N]
 
     def _make_pipeline(self, obstacles: int) -> Pipeline:
-        settings, count, ranges = self._settings, self.count, self._settings.sensors
+        settings, count, ranges = self._settings, self.count, self._ranges
         batch = self._task.adapter.make_batch(settings, count, obstacles, self._threads)
         adapter = self._task.adapter(settings, batch.layout)
         observer = Observer(adapter, self._task)
@@ -148,14 +149,14 @@ class Transition:
 
     def _sample_hidden(self, generator: np.random.Generator) -> tuple[Imperfections | None, Drawn]:
         """Return imperfections and robot of an episode, sampled aside so that scenes are the same whatever they are."""
-        settings, seed = self._settings, int(generator.integers(SEEDS))
-        if settings.sensors is None and settings.randomize is None:
+        settings, ranges, seed = self._settings, self._ranges, int(generator.integers(SEEDS))
+        if ranges is None and settings.randomize is None:
             return None, Drawn()
         aside, sampled, drawn = np.random.default_rng(seed), None, Drawn()
         if settings.randomize is not None:
             drawn = settings.randomize.sample(settings.robot, aside)
-        if settings.sensors is not None:
-            sampled = sample_imperfections(settings.sensors, settings.scales, self.adapter.body, aside)
+        if ranges is not None:
+            sampled = sample_imperfections(ranges, self.adapter.scales, self.adapter.body, aside)
         return sampled, drawn
 
     def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
@@ -214,7 +215,7 @@ class Transition:
         self, robots: Sequence[int], imperfections: Sequence[Imperfections | None], drawn: Sequence[Drawn]
     ) -> None:
         """Note what robots are, for observation and info."""
-        ranges, sensing = self._settings.randomize, self._settings.sensors
+        ranges, sensing = self._settings.randomize, self._ranges
         assert ranges is not None
         losses = [0.0 if sampled is None else sampled.tendon_loss for sampled in imperfections]
         self._drawn[robots] = [(*own.ratios, loss) for own, loss in zip(drawn, losses, strict=True)]
