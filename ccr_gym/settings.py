@@ -19,7 +19,7 @@ from ccr_gym.checks import (
 )
 from ccr_gym.randomization import Randomization
 from ccr_gym.reward import RewardWeights
-from ccr_gym.scales import FORCE_SPAN, Scales
+from ccr_gym.scales import FORCE_SPAN, TENSION_SPAN, Scales
 from ccr_gym.sensing import EXACT, Sensing
 from solver import PRESETS, Actuation, Cable, Robot
 from solver.common.validation import SMALLEST
@@ -162,6 +162,11 @@ class BaseSettings(Generic[RobotT]):
     def force_span(self) -> float:
         """Force that is observed as 1 [EI/L²]: S sections, each of which keeps its bend, are S² times as stiff."""
         return FORCE_SPAN * self.actuation.sections**2
+
+    @property
+    def tension_span(self) -> float:
+        """Tension that is observed as 1 [EI/(aL)]: each of S sections bends by an angle over an S-th of the length."""
+        return TENSION_SPAN * self.actuation.sections
 
     @property
     def senses_force(self) -> bool:

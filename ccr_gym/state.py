@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from ccr_gym.checks import check_type
 from solver import Scene
-from solver.common.rows import Rows, as_slice, copied
+from solver.common.rows import Rows, as_slice, copies
 
 Arrays = dict[str, np.ndarray]
 
@@ -55,8 +56,8 @@ class EnvState:
 
 def take(owner: object, names: tuple[str, ...], robots: list[int]) -> Arrays:
     """Return copies of the rows of arrays that are attributes of an object."""
-    at = as_slice(robots)
-    return {name: copied(rows, at) for name in names if (rows := getattr(owner, name)) is not None}
+    arrays = {name: rows for name, rows in zip(names, attrgetter(*names)(owner), strict=True) if rows is not None}
+    return dict(zip(arrays, copies(arrays.values(), as_slice(robots)), strict=True))
 
 
 def put(owner: object, arrays: Arrays, robots: list[int]) -> None:

@@ -100,6 +100,10 @@ class Transition:
         self._obstacle_features = np.zeros((count, self.adapter.obstacle_size))
         self._drawn = np.ones((count, DRAWN_SIZE))  # what the robots are
         self._robot_features = np.zeros((count, DRAWN_SIZE))
+        drawn = settings.randomize is not None
+        varied = {"_goal_n": self._vector, "_obstacle_features": self.adapter.obstacle_size > 0}
+        varied |= {"_drawn": drawn, "_robot_features": drawn}
+        self._kept = tuple(name for name in STATE if varied.get(name, True))  # what differs from episode to episode
         self._time = np.zeros(count, int)  # steps of the episode
         self._tensions = np.zeros((count, self.batch.cables))  # as the motors see them [N]
         self._onsets = np.zeros((count, self.batch.cables))  # those before the model's present contact [N]
@@ -190,8 +194,8 @@ class Transition:
             self._desired_n[robots] = norm(forces)
         self.batch.rest(robots)
         if self._sensors is not None:
-            for robot, assignment, own in zip(robots, assignments, drawn, strict=True):
-                self.model.assign(robot, assignment.scene, own.robot)
+            for robot in robots:
+                self.model.assign_alike(robot, self.batch)
             self.model.rest(robots)
         self._estimator.rest(robots, [own.robot for own in drawn])
         self._last_actions[robots], self._time[robots] = 0.0, 0
@@ -298,7 +302,7 @@ class Transition:
         starts = tuple(self._starts[robot] for robot in robots)
         model = None if self._sensors is None else self.model.get_rows(robots)
         return EpisodeState(
-            self.batch.get_rows(robots), model, starts, free, take(self, STATE, robots), learnt, sensors
+            self.batch.get_rows(robots), model, starts, free, take(self, self._kept, robots), learnt, sensors
         )
 
     def set_rows(self, robots: list[int], state: EpisodeState) -> None:
@@ -321,8 +325,8 @@ class Transition:
 
     def _check_alike(self, state: EpisodeState) -> None:
         """Raise an error for a state that lacks a part that these episodes have, or has one that they lack."""
-        own = self._motions_mm is not None, self._profiles is not None, self._sensors is not None
-        given = "_motions_mm" in state.episode, "_profiles" in state.episode, bool(state.sensors)
+        own = {name for name in self._kept if getattr(self, name) is not None}, self._sensors is not None
+        given = set(state.episode), bool(state.sensors)
         require(own == given, "the state is of another task or sensing; take it from an environment of equal arguments")
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:

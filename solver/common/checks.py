@@ -19,10 +19,13 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
     Raises:
         ValueError: Naming the obstacle, its inner radius and what the robot needs.
     """
+    longest = max(robot.edges_mm)
     for obstacle in scene:
+        inradius = obstacle.extent.inradius
+        if 2 * inradius > longest:
+            continue
         touchable = obstacle.touchable(robot.segments + 1)
-        inradius, longest = obstacle.extent.inradius, max(robot.edges_mm)
-        if (touchable[1:] & touchable[:-1]).any() and not 2 * inradius > longest:
+        if (touchable[1:] & touchable[:-1]).any():
             between = math.floor(longest * (robot.between + 1) / (2 * inradius))
             raise ValueError(
                 f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.6g} mm; it could slip "
