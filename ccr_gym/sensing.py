@@ -232,8 +232,7 @@ class SensorModel:
         self._has_backlash = np.arange(actions.size) < actions.commands  # cables have, the insertion has none
         self._numbers = np.zeros(count, EPISODE)
         self._numbers["rigidity_ratio"] = 1.0
-        self._motor_mm = np.zeros((count, actions.size))
-        self._moved_in = np.ones((count, body.cables), bool)
+        self._motor_mm, self._moved_in = np.zeros((count, actions.size)), np.ones((count, body.cables), bool)
         self._tension_zero, self._force_bias = np.zeros((count, body.cables)), np.zeros((count, body.space))
         self._pose_noise = np.zeros((count, body.space + body.turns))
         self._pose_error = np.zeros((count, body.nodes, body.space + body.turns))
@@ -261,8 +260,7 @@ class SensorModel:
         self._numbers[robot] = NUMBERS_OF(sampled)
         self._tension_zero[robot], self._force_bias[robot] = sampled.tension_zero, sampled.force_bias
         self._pose_noise[robot], self._pose_error[robot] = sampled.pose_noise, sampled.pose_error
-        self._motor_mm[robot], self._moved_in[robot] = motor_mm, True
-        self._history_empty[robot] = True
+        self._motor_mm[robot], self._moved_in[robot], self._history_empty[robot] = motor_mm, True, True
 
     def get_rows(self, robots: list[int]) -> Arrays:
         """Return the state of some robots."""

@@ -76,7 +76,8 @@ class BaseSettings(Generic[RobotT]):
             paper's system to the letter.
         obs_mode: Form of the observation: ``"flat"``, ``"dict"`` for its named parts, or ``"goal"`` for a
             goal-conditioned environment with ``observation``, ``achieved_goal`` and ``desired_goal``, whose reward is
-            ``−min(|F − F_d| / F_d, 1)``.
+            ``−min(|F − F_d| / F_d, 1)``. Its ``achieved_goal`` is the regulated force F without errors of sensors, for
+            the reward; a policy that is to run on sensors must read the other two alone.
         force_sensor: Whether the measured contact force is observed beside the estimate.
         max_increment_mm: Cable displacement of a full action [mm]; ``None`` stands for a/16, shared by the sections.
         cable_limit_mm: Largest cable displacement that actions can command [mm]; ``None`` stands for 1.75 a, shared by

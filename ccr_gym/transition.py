@@ -100,10 +100,9 @@ class Transition:
         self._obstacle_features = np.zeros((count, self.adapter.obstacle_size))
         self._drawn = np.ones((count, DRAWN_SIZE))  # what the robots are
         self._robot_features = np.zeros((count, DRAWN_SIZE))
-        drawn = settings.randomize is not None
-        varied = {"_goal_n": self._vector, "_obstacle_features": self.adapter.obstacle_size > 0}
-        varied |= {"_drawn": drawn, "_robot_features": drawn}
-        self._kept = tuple(name for name in STATE if varied.get(name, True))  # what differs from episode to episode
+        fixed = [] if self._vector else ["_goal_n"]
+        fixed += [] if settings.randomize else ["_drawn", "_robot_features"]
+        self._kept = tuple(name for name in STATE if name not in fixed)  # what differs from episode to episode
         self._time = np.zeros(count, int)  # steps of the episode
         self._tensions = np.zeros((count, self.batch.cables))  # as the motors see them [N]
         self._onsets = np.zeros((count, self.batch.cables))  # those before the model's present contact [N]

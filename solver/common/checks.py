@@ -8,6 +8,7 @@ import numpy as np
 from solver.common.equilibrium import BaseEquilibrium
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
+from solver.common.status import Status
 from solver.common.validation import check_instance, shown
 
 SPRINGS = (1e-10, 1e10)  # stiffness of an obstacle's spring, over EI/L³ of the robot
@@ -46,11 +47,18 @@ def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
 
 
 def check_rest(rest: BaseEquilibrium[AnyRobot]) -> None:
-    """Check that no obstacle overlaps the robot at rest; one that its loads press it against is met to roundoff.
+    """Check that the motors hold the robot at rest, and that no obstacle overlaps it.
+
+    An obstacle that its loads press it against is met to roundoff.
 
     Raises:
-        ValueError: As :func:`check_clear`.
+        ValueError: As :func:`check_clear`, or naming the tension limit that its loads exceed.
     """
+    if rest.status is Status.STALLED and rest.robot.least_cable_mm == 0:  # others pay out what they cannot hold
+        raise ValueError(
+            f"max_tension is {rest.robot.max_tension:.6g} N; at rest the loads of the robot pull its only cable, which "
+            "cannot be paid out below 0, with more: raise max_tension, lower loads or weight, or add an opposed cable"
+        )
     check_clear(rest.robot, rest.scene, np.where(rest.contact, 0.0, rest.gaps))
 
 

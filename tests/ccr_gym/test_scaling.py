@@ -16,7 +16,7 @@ CLOSE = 1e-5
 
 def scaled(robot, s):
     """Return a robot s times as large."""
-    lengths = {name: s * getattr(robot, name) for name in ("length_mm", "offset_mm", "max_cable_mm")}
+    lengths = {name: s * getattr(robot, name) for name in ("length_mm", "offset_mm")}
     if robot.model == "rod":
         offsets = [cable.offset_mm or robot.offset_mm for cable in robot.cables]
         lengths["cables"] = tuple(replace(c, offset_mm=s * a) for c, a in zip(robot.cables, offsets, strict=True))
