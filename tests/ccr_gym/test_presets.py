@@ -66,3 +66,14 @@ def test_a_robot_in_space_needs_no_opposed_cables():
         x, y, _ = env.equilibrium.scene.obstacles[0].extent.center
         assert x > -20
         assert y > -20
+
+
+@pytest.mark.parametrize("preset", ["rao_2021", "snake_arm", "neuroendoscope"])
+def test_tensions_of_two_sections_stay_within_their_scale(preset):
+    """Even where motors are at their limit and the robot is twice as stiff as it is thought to be."""
+    env = gymnasium.make("CCR/PushObstacle-v1", robot=preset, sensing={"rigidity_ratio": (2, 2)}).unwrapped
+    env.reset(seed=0)
+    tensions, most = env.observation_slices["tension"], 0.0
+    for _ in range(32):
+        most = max(most, env.step(np.ones(2, np.float32))[0][tensions].max())
+    assert 0.4 < most < 1
