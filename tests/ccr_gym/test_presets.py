@@ -68,12 +68,11 @@ def test_a_robot_in_space_needs_no_opposed_cables():
         assert y > -20
 
 
-@pytest.mark.parametrize("preset", ["rao_2021", "snake_arm", "neuroendoscope"])
-def test_tensions_of_two_sections_stay_within_their_scale(preset):
+def test_tensions_of_two_sections_stay_within_their_scale():
     """Even where motors are at their limit and the robot is twice as stiff as it is thought to be."""
-    env = gymnasium.make("CCR/PushObstacle-v1", robot=preset, sensing={"rigidity_ratio": (2, 2)}).unwrapped
+    env = gymnasium.make("CCR/PushObstacle-v1", robot="neuroendoscope", sensing={"rigidity_ratio": (2, 2)}).unwrapped
     env.reset(seed=0)
-    tensions, most = env.observation_slices["tension"], 0.0
-    for _ in range(32):
-        most = max(most, env.step(np.ones(2, np.float32))[0][tensions].max())
-    assert 0.4 < most < 1
+    steps = [env.step(np.ones(2, np.float32)) for _ in range(32)]
+    tensions = np.array([observation[env.observation_slices["tension"]] for observation, *_ in steps])
+    assert steps[-1][-1]["solver_status"] == Status.STALLED
+    assert 0.5 < tensions.max() < 1
