@@ -1,7 +1,8 @@
 """States of environments, taken out and put back: planning on copies, forks, exact continuation elsewhere."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from operator import attrgetter
 from typing import Any
 
@@ -56,8 +57,14 @@ class EnvState:
 
 def take(owner: object, names: tuple[str, ...], robots: list[int]) -> Arrays:
     """Return copies of the rows of arrays that are attributes of an object."""
-    arrays = {name: rows for name, rows in zip(names, attrgetter(*names)(owner), strict=True) if rows is not None}
+    arrays = {name: rows for name, rows in zip(names, _getter(names)(owner), strict=True) if rows is not None}
     return dict(zip(arrays, copies(arrays.values(), as_slice(robots)), strict=True))
+
+
+@cache
+def _getter(names: tuple[str, ...]) -> Callable[[object], tuple[Any, ...]]:
+    """Return what reads these attributes of an object; to make it takes as long as to use it."""
+    return attrgetter(*names)
 
 
 def put(owner: object, arrays: Arrays, robots: list[int]) -> None:

@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, ClassVar, Generic, NamedTuple, Self
 
@@ -22,8 +21,7 @@ NUMBERS = ("blocks", "statuses", "iterations", "factorizations", "commands")
 NUMBERS_OF = attrgetter(*NUMBERS)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class Rows(NamedTuple):
     """States of robots of a batch: all that their next step depends on.
 
     Attributes:
