@@ -57,8 +57,7 @@ class EnvState:
 
 def take(owner: object, names: tuple[str, ...], robots: list[int]) -> Arrays:
     """Return copies of the rows of arrays that are attributes of an object."""
-    arrays = {name: rows for name, rows in zip(names, _getter(names)(owner), strict=True) if rows is not None}
-    return dict(zip(arrays, copies(arrays.values(), as_slice(robots)), strict=True))
+    return dict(zip(names, copies(_getter(names)(owner), as_slice(robots)), strict=True))
 
 
 @cache

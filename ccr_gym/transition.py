@@ -100,12 +100,12 @@ class Transition:
         self._obstacle_features = np.zeros((count, self.adapter.obstacle_size))
         self._drawn = np.ones((count, DRAWN_SIZE))  # what the robots are
         self._robot_features = np.zeros((count, DRAWN_SIZE))
-        fixed = [] if self._vector else ["_goal_n"]
-        fixed += [] if settings.randomize else ["_drawn", "_robot_features"]
-        self._kept = tuple(name for name in STATE if name not in fixed)  # what differs from episode to episode
         self._time = np.zeros(count, int)  # steps of the episode
         self._tensions = np.zeros((count, self.batch.cables))  # as the motors see them [N]
         self._onsets = np.zeros((count, self.batch.cables))  # those before the model's present contact [N]
+        fixed = [] if self._vector else ["_goal_n"]
+        fixed += [] if settings.randomize else ["_drawn", "_robot_features"]
+        self._kept = tuple(name for name in STATE if name not in fixed and getattr(self, name) is not None)
 
     def _make_pipeline(self, obstacles: int) -> Pipeline:
         settings, count, ranges = self._settings, self.count, self._ranges
@@ -324,8 +324,8 @@ class Transition:
 
     def _check_alike(self, state: EpisodeState) -> None:
         """Raise an error for a state that lacks a part that these episodes have, or has one that they lack."""
-        own = {name for name in self._kept if getattr(self, name) is not None}, self._sensors is not None
-        given = set(state.episode), bool(state.sensors)
+        own = self._kept, self._sensors is not None
+        given = tuple(state.episode), bool(state.sensors)
         require(own == given, "the state is of another task or sensing; take it from an environment of equal arguments")
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:

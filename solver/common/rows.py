@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from operator import attrgetter
-from typing import Any, ClassVar, Generic, NamedTuple, Self
+from typing import Any, ClassVar, Generic, NamedTuple, Self, cast
 
 import numpy as np
 
@@ -158,12 +158,7 @@ class RowBatch(ABC, Generic[RobotT_co]):
         self._check_rows(rows, len(indices))
         entries = list(zip(indices, rows.robots, rows.scenes, rows.rested.tolist(), strict=True))
         changed = [entry[:3] for entry in entries if entry[1:3] != (self._robots[entry[0]], self._scenes[entry[0]])]
-        others = {robot for index, robot, _ in changed if robot is not None and robot != self._robots[index]}
-        for other in others:
-            self._check_own(other)
-        places = {(robot, scene) for _, robot, scene in changed if scene is not None}
-        compiled = {(robot, scene): self._compile(robot or self.robot, scene) for robot, scene in places}
-        made = {other: self._kernel_robot(other) for other in others}
+        compiled, made = self._prepare(changed) if changed else ({}, {})
         with self._exclusive:
             for index, robot, scene in changed:
                 self._become(index, robot, None if robot is None else made.get(robot))
@@ -174,8 +169,17 @@ class RowBatch(ABC, Generic[RobotT_co]):
             for index, _, scene, rested in entries:
                 (self._unrested.discard if rested and scene is not None else self._unrested.add)(index)
             at = as_slice(indices)
-            for own, given in zip(NUMBERS_OF(self), NUMBERS_OF(rows), strict=True):
+            for own, given in zip(NUMBERS_OF(self), cast("Any", rows[-len(NUMBERS) :]), strict=True):
                 own[at] = given
+
+    def _prepare(self, changed: list[tuple[int, Any, Scene | None]]) -> tuple[dict[Any, Kernel], dict[Any, Kernel]]:
+        """Return scenes, by robot and scene, and robots that indices are to have, as the kernel takes them."""
+        others = {robot for index, robot, _ in changed if robot is not None and robot != self._robots[index]}
+        for other in others:
+            self._check_own(other)
+        places = {(robot, scene) for _, robot, scene in changed if scene is not None}
+        compiled = {(robot, scene): self._compile(robot or self.robot, scene) for robot, scene in places}
+        return compiled, {other: self._kernel_robot(other) for other in others}
 
     def _become(self, index: int, robot: Any, made: Kernel) -> None:
         """Make a robot of the batch another one, given as the kernel takes it too; ``None`` for the batch's."""
@@ -217,7 +221,8 @@ class RowBatch(ABC, Generic[RobotT_co]):
             raise ValueError(f"rows has {len(rows.robots)} robots; it must have one for each of the {count} robots")
         if len(rows.scenes) != count or np.shape(rows.rested) != (count,):
             raise ValueError(f"rows has {len(rows.scenes)} scenes; it must have one for each of the {count} robots")
-        for name, numbers, present in zip(NUMBERS, NUMBERS_OF(rows), NUMBERS_OF(self), strict=True):
+        given = cast("Any", rows[-len(NUMBERS) :])
+        for name, numbers, present in zip(NUMBERS, given, NUMBERS_OF(self), strict=True):
             if numbers.shape != (count, *present.shape[1:]) or numbers.dtype != present.dtype:
                 raise ValueError(
                     f"{name} of rows has the shape {numbers.shape} of {numbers.dtype}; it must be "
