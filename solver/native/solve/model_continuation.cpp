@@ -154,6 +154,7 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
     }
     Command goal = raise_to_pretension(pursuit.wanted);
     if (moves_obstacles(goal)) share_motion(goal, pursuit.holds);
+    if (highest(tensions_) > limit) wait_for_motors(goal);
     const double remaining = command_distance(present_.command, goal);
     if (remaining == 0 && resume(pursuit)) continue;
     if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;

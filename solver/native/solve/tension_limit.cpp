@@ -77,7 +77,7 @@ bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
   const auto give_up = [&](double tension) {
     bool held = false;
     for (int k = 0; k < kCables; ++k) {
-      if (tensions_[k] < tension || pull(wanted, k) <= pull(present_.command, k)) continue;
+      if (tensions_[k] < tension || !pulls_in(wanted, k)) continue;
       wanted.cables[k] = present_.command.cables[k];
       held = true;
     }
@@ -101,6 +101,13 @@ bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const
     changed = true;
   }
   return changed;
+}
+
+// Keeps other cables from being pulled in while motors yield.
+template <class Model>
+void ModelContinuation<Model>::wait_for_motors(Command& goal) const {
+  for (int k = 0; k < kCables; ++k)
+    if (pull(goal, k) > pull(present_.command, k)) goal.cables[k] = present_.command.cables[k];
 }
 
 // Whether a cable that its motor cannot hold has nothing more to let out.
@@ -165,6 +172,7 @@ bool ModelContinuation<Model>::is_blocked(const Command& command) {
   template bool ModelContinuation<Model>::approach_tension_limit();             \
   template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;  \
   template bool ModelContinuation<Model>::yield_cables(Command&, double) const; \
+  template void ModelContinuation<Model>::wait_for_motors(Command&) const;      \
   template bool ModelContinuation<Model>::is_unyielding() const;                \
   template bool ModelContinuation<Model>::is_blocked(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
