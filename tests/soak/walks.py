@@ -6,9 +6,10 @@ import numpy as np
 
 from soak.cores import line_points
 from soak.drives import drives_of
-from solver import Robot
+from solver import Robot, Status
 
 SIGNED = 0.8  # share of the moves of several cables that are signed commands
+IN_VAIN = 10  # steps given up on in a row after which a walk ends: it would go on so, from a robot folded over
 
 
 class Walk(NamedTuple):
@@ -59,7 +60,7 @@ class Numbers(NamedTuple):
 def walk(solver, increments):
     """Walk by increments on what the robot has reached, clipped to its range.
 
-    Each is a pair of a drive and a move of its inputs, the length last.
+    Each is a pair of a drive and a move of its inputs, the length last. A walk that gets nowhere ends early.
     """
     states, commands = [solver.rest()], []
     for drive, increment in increments:
@@ -67,6 +68,8 @@ def walk(solver, increments):
         command = np.append(drive.pulls(reached[:-1], increment[:-1]), reached[-1] + increment[-1])
         commands.append(_in_range(solver.robot, command))
         states.append(step(solver, states[-1], commands[-1]))
+        if all(state.status == Status.GAVE_UP for state in states[-IN_VAIN:]):
+            break
     return Walk(states, np.reshape(commands, (-1, len(solver.robot.cables) + 1)))
 
 
