@@ -120,7 +120,7 @@ def _optimality(solver, taken, tally, offset):
         if wanted:
             certified += 1
             tally.certified += 1
-            worst = certificate(state)
+            worst = certificate(state) / _strain(state)
             tally.worst_certificate = max(tally.worst_certificate, worst)
             if not worst <= CERTIFIED:
                 findings.append(Finding("certificate", k, worst))
