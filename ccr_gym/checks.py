@@ -136,6 +136,8 @@ def check_number(name: str, value: object, *, low: float = -LARGEST, high: float
     Raises:
         ValueError: If it is not a number, or out of bounds.
     """
+    if type(value) is float and low <= value <= high:
+        return value + 0.0  # a zero without a sign
     return validation.check_number(name, value, low, high, f"a number {Bounds(low, high, None, reason)}")
 
 

@@ -42,7 +42,11 @@ def describe(task: AnyTask, title: str, description: str, start: str, *, action:
 
             Without a force sensor the keys `force_error` and `force_measured` are absent. Where sensing is not ideal
             there are `tension`, of each cable as a load cell at its motor reads it, and `free_tension` and `lever` of
-            the nominal model; with `randomize` there is `robot`.""",
+            the nominal model; with `randomize` there is `robot`.
+
+            With `obs_mode="goal"` this row is `observation`, beside `desired_goal`, the set-point, and `achieved_goal`,
+            the regulated force without errors of sensors: the reward follows from it, and no policy that is to run on
+            sensors may read it.""",
         "Rewards": _rewards(settings, adapter.space),
         "Starting State": start.format(**_field_texts(task))
         + f""" Lengths are multiples of the robot's length L, here {settings.scales.length_mm:g} mm, and forces of

@@ -1,4 +1,9 @@
-"""The goal-conditioned form of an environment, for hindsight relabelling: the goal is the desired force."""
+"""The goal-conditioned form of an environment, for hindsight relabelling: the goal is the desired force.
+
+``observation`` is what the other forms observe: what sensors tell. ``achieved_goal`` is the regulated force itself,
+exact at every ``sensing``, because the reward follows from it and relabelled rewards must be those of the environment.
+It is for the replay buffer alone: a policy that is to run on sensors must not read it (docs/sensing.md).
+"""
 
 from typing import Any
 

@@ -9,7 +9,7 @@ from gymnasium import spaces
 from ccr_gym.adapters import AnyAdapter, Feature, Features
 from ccr_gym.quantities import Quantity
 from ccr_gym.randomization import DRAWN_SIZE
-from ccr_gym.scales import AHEAD, TENSION_SPAN
+from ccr_gym.scales import AHEAD
 from ccr_gym.sensing import DELAYED_KEYS
 from ccr_gym.task import AnyTask
 
@@ -76,7 +76,7 @@ class Observer:
         for key in DELAYED_KEYS:
             self.delayed[self._columns.get(key, slice(0))] = True
         self._force_n = adapter.settings.force_span * adapter.scales.force_n
-        self._tension_n = TENSION_SPAN * adapter.scales.tension_n
+        self._tension_n = adapter.settings.tension_span * adapter.scales.tension_n
         self._lever_scale = adapter.scales.travel_mm / adapter.scales.length_mm
         self._disturb_pose = adapter.disturb_pose
         most = np.maximum(np.abs(adapter.actions.low_mm), adapter.actions.high_mm)

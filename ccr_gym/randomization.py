@@ -100,6 +100,7 @@ def _resized(robot: Any, rigidity: float, length: float, offset: float) -> Any:
         rigidity=robot.rigidity * rigidity,
         length_mm=robot.length_mm * length,
         offset_mm=robot.offset_mm * offset,
+        max_cable_mm=robot.cable_limit_mm,  # the actions of the nominal robot
         cables=cables,
         segment_rigidity=None if segments is None else tuple(rigidity * own for own in segments),
     )

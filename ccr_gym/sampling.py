@@ -38,6 +38,7 @@ class Trials:
 
     def __init__(self, task: AnyTask, settings: AnySettings, batch: BaseBatch, adapter: AnyAdapter) -> None:
         self._task, self._settings, self._batch, self._adapter = task, settings, batch, adapter
+        self._split, self._limit_mm = settings.split, _limit_mm(settings, adapter)
         self._estimator = None
         if settings.regulate == "estimate":
             self._estimator = ForceEstimator(adapter, batch.count, batch.threads, learns=False)
@@ -92,17 +93,6 @@ class Trials:
             f"none of {MAX_SAMPLES} samples of {self._task} can be pushed as desired within {self._limit_mm:.6g} mm of "
             "cable and the tension limit; widen the task's ranges, or either limit"
         )
-
-    @property
-    def _split(self) -> str:
-        return self._settings.split
-
-    @property
-    def _limit_mm(self) -> float:
-        """Largest cable displacement, of all sections together, that is reached whatever the play [mm]."""
-        actuation, sensors = self._adapter.actuation, self._settings.sensors
-        play = 0.0 if sensors is None else sensors.backlash[1] * self._adapter.scales.travel_mm
-        return max(self._settings.cable_limit_mm - play, 0.5 * self._settings.cable_limit_mm) * actuation.sections
 
     def _place(self, robot: int, scene: Scene, drawn: Drawn) -> bool:
         """Put a robot among obstacles if they leave it clear, and return whether they do."""
@@ -164,6 +154,13 @@ class Trials:
         """Return actuated coordinates with these commands and lengths, ``(k, actions)`` [mm]."""
         spare = self._adapter.actions.size - commands.shape[1]
         return np.concatenate([commands, lengths[:, :spare]], axis=1)
+
+
+def _limit_mm(settings: AnySettings, adapter: AnyAdapter) -> float:
+    """Return the largest cable displacement, of all sections together, that is reached whatever the play [mm]."""
+    sensors = settings.sensors
+    play = 0.0 if sensors is None else sensors.backlash[1] * adapter.scales.travel_mm
+    return max(settings.cable_limit_mm - play, 0.5 * settings.cable_limit_mm) * adapter.actuation.sections
 
 
 def check_robot(task: AnyTask, robot: AnyRobot) -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from solver.common.robot import AnyRobot
 
 FORCE_SPAN = 10.0  # force on a robot of one section that is observed as 1 [EI/L²]
-TENSION_SPAN = 10.0  # tension that is observed as 1 [EI/(aL)]
+TENSION_SPAN = 10.0  # tension of a robot of one section that is observed as 1 [EI/(aL)]
 RADIUS_SPAN = 1 / 9  # obstacle radius that is observed as 1 [L]
 AHEAD = (2, 4, 8)  # steps ahead at which a moving set-point is observed
 

@@ -6,6 +6,7 @@ natural units (:class:`ccr_gym.scales.Scales`).
 
 import math
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -24,23 +25,28 @@ DELAYED_KEYS = ("force_error", "force_measured", "frames", "nodes")  # what a ca
 HISTORY = 8  # observations kept, more than the largest latency
 MAX_LOSS = 0.9  # share of the tension that friction takes at most
 DEGREE = math.pi / 180
-STATE = (
+NUMBERS = (
     "latency",
-    "_backlash_mm",
-    "_motor_mm",
+    "backlash_mm",
     "tendon_loss",
+    "rigidity_ratio",
+    "tension_noise",
+    "force_noise",
+    "force_resolution",
+    "start",
+)  # of Imperfections, that are single numbers
+NUMBERS_OF = attrgetter(*NUMBERS)
+EPISODE = np.dtype([(name, int if name in ("latency", "start") else float) for name in NUMBERS])
+STATE = (
+    "_numbers",
+    "_motor_mm",
     "_moved_in",
-    "_tension_noise",
     "_tension_zero",
-    "_force_noise",
     "_force_bias",
-    "_force_resolution",
     "_pose_noise",
     "_pose_error",
-    "_start",
     "_history",
     "_history_empty",
-    "rigidity_ratio",
 )  # arrays of a SensorModel
 
 
@@ -214,11 +220,6 @@ def _pose_sizes(place_mm: float, angle: float, body: Body) -> np.ndarray:
 class SensorModel:
     """Motors and sensors of many robots.
 
-    Attributes:
-        rigidity_ratio: Rigidity of each robot over its nominal value, ``(N,)``.
-        tendon_loss: Share of the tension that friction takes, ``(N,)``.
-        latency: Delay of shape and force sensor, ``(N,)`` [steps].
-
     Args:
         count: Number N of robots.
         body: Sizes of what is sensed.
@@ -229,31 +230,37 @@ class SensorModel:
     def __init__(self, count: int, body: Body, actions: ActionSpec, delayed: np.ndarray) -> None:
         self._actions, self._delayed, self._body = actions, delayed, body
         self._has_backlash = np.arange(actions.size) < actions.commands  # cables have, the insertion has none
-        self.latency = np.zeros(count, int)
-        self._backlash_mm = np.zeros(count)
-        self._motor_mm = np.zeros((count, actions.size))
-        self.tendon_loss, self._moved_in = np.zeros(count), np.ones((count, body.cables), bool)
-        self._tension_noise, self._tension_zero = np.zeros(count), np.zeros((count, body.cables))
-        self._force_noise, self._force_bias = np.zeros(count), np.zeros((count, body.space))
-        self._force_resolution = np.zeros(count)
+        self._numbers = np.zeros(count, EPISODE)
+        self._numbers["rigidity_ratio"] = 1.0
+        self._motor_mm, self._moved_in = np.zeros((count, actions.size)), np.ones((count, body.cables), bool)
+        self._tension_zero, self._force_bias = np.zeros((count, body.cables)), np.zeros((count, body.space))
         self._pose_noise = np.zeros((count, body.space + body.turns))
         self._pose_error = np.zeros((count, body.nodes, body.space + body.turns))
-        self._start = np.zeros(count, int)
         self._white = body.cables + body.space + (body.nodes - 1) * (body.space + body.turns)  # numbers of a step
         self._history = np.zeros((count, HISTORY, delayed.size))
         self._history_empty = np.ones(count, bool)
-        self.rigidity_ratio = np.ones(count)
+
+    @property
+    def rigidity_ratio(self) -> np.ndarray:
+        """Rigidity of each robot over its nominal value, ``(N,)``."""
+        return self._numbers["rigidity_ratio"]
+
+    @property
+    def tendon_loss(self) -> np.ndarray:
+        """Share of the tension that friction takes, ``(N,)``."""
+        return self._numbers["tendon_loss"]
+
+    @property
+    def latency(self) -> np.ndarray:
+        """Delay of shape and force sensor, ``(N,)`` [steps]."""
+        return self._numbers["latency"]
 
     def begin_episode(self, robot: int, sampled: Imperfections, motor_mm: np.ndarray) -> None:
         """Begin a robot's next episode, with the motors at these positions."""
-        self.latency[robot], self._backlash_mm[robot] = sampled.latency, sampled.backlash_mm
-        self.tendon_loss[robot], self.rigidity_ratio[robot] = sampled.tendon_loss, sampled.rigidity_ratio
-        self._tension_noise[robot], self._tension_zero[robot] = sampled.tension_noise, sampled.tension_zero
-        self._force_noise[robot], self._force_bias[robot] = sampled.force_noise, sampled.force_bias
-        self._force_resolution[robot] = sampled.force_resolution
+        self._numbers[robot] = NUMBERS_OF(sampled)
+        self._tension_zero[robot], self._force_bias[robot] = sampled.tension_zero, sampled.force_bias
         self._pose_noise[robot], self._pose_error[robot] = sampled.pose_noise, sampled.pose_error
-        self._motor_mm[robot], self._moved_in[robot] = motor_mm, True
-        self._start[robot], self._history_empty[robot] = sampled.start, True
+        self._motor_mm[robot], self._moved_in[robot], self._history_empty[robot] = motor_mm, True, True
 
     def get_rows(self, robots: list[int]) -> Arrays:
         """Return the state of some robots."""
@@ -296,17 +303,21 @@ class SensorModel:
 
     def half_backlash_mm(self, index: EnvIndex) -> np.ndarray:
         """Return how far motors and actuated coordinates can be apart, ``(..., actions)`` [mm]."""
-        return np.asarray(np.asarray(self._backlash_mm[index])[..., None] / 2 * self._has_backlash)
+        return np.asarray(np.asarray(self._numbers["backlash_mm"][index])[..., None] / 2 * self._has_backlash)
 
     def measured_tensions(self, tensions: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Return what load cells at the motors read for nominal tensions in the robot, ``(..., c)`` [N]."""
-        noise = self._noise(time, index, 0, self._body.cables) * self._tension_noise[index][..., None]
+        noise = self._noise(time, index, 0, self._body.cables) * self._numbers["tension_noise"][index][..., None]
         return np.asarray(self.motor_tensions(tensions, index) + self._tension_zero[index] + noise)
 
     def measured_force(self, force: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Return what the force sensor reads for forces ``(..., d)`` [N]: bias, noise, then steps of its resolution."""
-        noise = self._noise(time, index, self._body.cables, self._body.space) * self._force_noise[index][..., None]
-        read, step = force + self._force_bias[index] + noise, self._force_resolution[index][..., None]
+        noise = (
+            self._noise(time, index, self._body.cables, self._body.space)
+            * self._numbers["force_noise"][index][..., None]
+        )
+        read = force + self._force_bias[index] + noise
+        step = self._numbers["force_resolution"][index][..., None]
         return np.asarray(np.where(step > 0, np.round(read / np.where(step > 0, step, 1.0)) * step, read))
 
     def pose_errors(self, time: np.ndarray, index: EnvIndex) -> np.ndarray:
@@ -320,7 +331,7 @@ class SensorModel:
 
     def _noise(self, time: np.ndarray, index: EnvIndex, first: int, count: int) -> np.ndarray:
         """Return some of the white noise of a step, of unit variance, ``(..., count)``."""
-        return white(np.asarray(self._start[index] + time[index] * self._white + first), count)
+        return white(np.asarray(self._numbers["start"][index] + time[index] * self._white + first), count)
 
     def apply_latency(self, rows: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Return observations whose delayed columns are those of earlier steps, of the first step at the beginning.

@@ -19,7 +19,7 @@ from ccr_gym.checks import (
 )
 from ccr_gym.randomization import Randomization
 from ccr_gym.reward import RewardWeights
-from ccr_gym.scales import FORCE_SPAN, Scales
+from ccr_gym.scales import FORCE_SPAN, TENSION_SPAN, Scales
 from ccr_gym.sensing import EXACT, Sensing
 from solver import PRESETS, Actuation, Cable, Robot
 from solver.common.validation import SMALLEST
@@ -76,7 +76,8 @@ class BaseSettings(Generic[RobotT]):
             paper's system to the letter.
         obs_mode: Form of the observation: ``"flat"``, ``"dict"`` for its named parts, or ``"goal"`` for a
             goal-conditioned environment with ``observation``, ``achieved_goal`` and ``desired_goal``, whose reward is
-            ``−min(|F − F_d| / F_d, 1)``.
+            ``−min(|F − F_d| / F_d, 1)``. Its ``achieved_goal`` is the regulated force F without errors of sensors, for
+            the reward; a policy that is to run on sensors must read the other two alone.
         force_sensor: Whether the measured contact force is observed beside the estimate.
         max_increment_mm: Cable displacement of a full action [mm]; ``None`` stands for a/16, shared by the sections.
         cable_limit_mm: Largest cable displacement that actions can command [mm]; ``None`` stands for 1.75 a, shared by
@@ -162,6 +163,11 @@ class BaseSettings(Generic[RobotT]):
     def force_span(self) -> float:
         """Force that is observed as 1 [EI/L²]: S sections, each of which keeps its bend, are S² times as stiff."""
         return FORCE_SPAN * self.actuation.sections**2
+
+    @property
+    def tension_span(self) -> float:
+        """Tension that is observed as 1 [EI/(aL)]: each of S sections bends by an angle over an S-th of the length."""
+        return TENSION_SPAN * self.actuation.sections
 
     @property
     def senses_force(self) -> bool:

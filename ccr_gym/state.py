@@ -1,14 +1,16 @@
 """States of environments, taken out and put back: planning on copies, forks, exact continuation elsewhere."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from ccr_gym.checks import check_type
 from solver import Scene
-from solver.common.rows import Rows, as_slice, copied
+from solver.common.rows import Rows, as_slice, copies
 
 Arrays = dict[str, np.ndarray]
 
@@ -55,8 +57,13 @@ class EnvState:
 
 def take(owner: object, names: tuple[str, ...], robots: list[int]) -> Arrays:
     """Return copies of the rows of arrays that are attributes of an object."""
-    at = as_slice(robots)
-    return {name: copied(rows, at) for name in names if (rows := getattr(owner, name)) is not None}
+    return dict(zip(names, copies(_getter(names)(owner), as_slice(robots)), strict=True))
+
+
+@cache
+def _getter(names: tuple[str, ...]) -> Callable[[object], tuple[Any, ...]]:
+    """Return what reads these attributes of an object; to make it takes as long as to use it."""
+    return attrgetter(*names)
 
 
 def put(owner: object, arrays: Arrays, robots: list[int]) -> None:

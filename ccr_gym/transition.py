@@ -85,6 +85,7 @@ class Transition:
         for robot in [settings.robot] if settings.randomize is None else settings.randomize.corners(settings.robot):
             check_robot(task, robot)
         self._task, self._settings, self.count, self._threads = task, settings, count, threads
+        self._ranges = settings.sensors  # which are made and checked at each access
         self._target, self._vector = task.target, task.force_vector
         self._own = self._make_pipeline(task.obstacles)
         self._trials = Trials(task, settings, self._own.batch, self._own.adapter)
@@ -102,9 +103,12 @@ class Transition:
         self._time = np.zeros(count, int)  # steps of the episode
         self._tensions = np.zeros((count, self.batch.cables))  # as the motors see them [N]
         self._onsets = np.zeros((count, self.batch.cables))  # those before the model's present contact [N]
+        fixed = [] if self._vector else ["_goal_n"]
+        fixed += [] if settings.randomize else ["_drawn", "_robot_features"]
+        self._kept = tuple(name for name in STATE if name not in fixed and getattr(self, name) is not None)
 
     def _make_pipeline(self, obstacles: int) -> Pipeline:
-        settings, count, ranges = self._settings, self.count, self._settings.sensors
+        settings, count, ranges = self._settings, self.count, self._ranges
         batch = self._task.adapter.make_batch(settings, count, obstacles, self._threads)
         adapter = self._task.adapter(settings, batch.layout)
         observer = Observer(adapter, self._task)
@@ -148,14 +152,14 @@ class Transition:
 
     def _sample_hidden(self, generator: np.random.Generator) -> tuple[Imperfections | None, Drawn]:
         """Return imperfections and robot of an episode, sampled aside so that scenes are the same whatever they are."""
-        settings, seed = self._settings, int(generator.integers(SEEDS))
-        if settings.sensors is None and settings.randomize is None:
+        settings, ranges, seed = self._settings, self._ranges, int(generator.integers(SEEDS))
+        if ranges is None and settings.randomize is None:
             return None, Drawn()
         aside, sampled, drawn = np.random.default_rng(seed), None, Drawn()
         if settings.randomize is not None:
             drawn = settings.randomize.sample(settings.robot, aside)
-        if settings.sensors is not None:
-            sampled = sample_imperfections(settings.sensors, settings.scales, self.adapter.body, aside)
+        if ranges is not None:
+            sampled = sample_imperfections(ranges, self.adapter.scales, self.adapter.body, aside)
         return sampled, drawn
 
     def start_given(self, robot: int, assignment: Assignment, generator: np.random.Generator) -> None:
@@ -189,8 +193,8 @@ class Transition:
             self._desired_n[robots] = norm(forces)
         self.batch.rest(robots)
         if self._sensors is not None:
-            for robot, assignment, own in zip(robots, assignments, drawn, strict=True):
-                self.model.assign(robot, assignment.scene, own.robot)
+            for robot in robots:
+                self.model.assign_alike(robot, self.batch)
             self.model.rest(robots)
         self._estimator.rest(robots, [own.robot for own in drawn])
         self._last_actions[robots], self._time[robots] = 0.0, 0
@@ -214,7 +218,7 @@ class Transition:
         self, robots: Sequence[int], imperfections: Sequence[Imperfections | None], drawn: Sequence[Drawn]
     ) -> None:
         """Note what robots are, for observation and info."""
-        ranges, sensing = self._settings.randomize, self._settings.sensors
+        ranges, sensing = self._settings.randomize, self._ranges
         assert ranges is not None
         losses = [0.0 if sampled is None else sampled.tendon_loss for sampled in imperfections]
         self._drawn[robots] = [(*own.ratios, loss) for own, loss in zip(drawn, losses, strict=True)]
@@ -297,7 +301,7 @@ class Transition:
         starts = tuple(self._starts[robot] for robot in robots)
         model = None if self._sensors is None else self.model.get_rows(robots)
         return EpisodeState(
-            self.batch.get_rows(robots), model, starts, free, take(self, STATE, robots), learnt, sensors
+            self.batch.get_rows(robots), model, starts, free, take(self, self._kept, robots), learnt, sensors
         )
 
     def set_rows(self, robots: list[int], state: EpisodeState) -> None:
@@ -320,8 +324,8 @@ class Transition:
 
     def _check_alike(self, state: EpisodeState) -> None:
         """Raise an error for a state that lacks a part that these episodes have, or has one that they lack."""
-        own = self._motions_mm is not None, self._profiles is not None, self._sensors is not None
-        given = "_motions_mm" in state.episode, "_profiles" in state.episode, bool(state.sensors)
+        own = self._kept, self._sensors is not None
+        given = tuple(state.episode), bool(state.sensors)
         require(own == given, "the state is of another task or sensing; take it from an environment of equal arguments")
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:

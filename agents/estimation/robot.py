@@ -10,7 +10,7 @@ from agents.estimation.candidates import ALL, Candidates, Loops
 from agents.estimation.force import ForceFilter
 from agents.estimation.shape import observed_commands
 from agents.estimation.tension import TensionFilter
-from ccr_gym import EXACT, TENSION_SPAN, Settings, SpatialSettings
+from ccr_gym import EXACT, Settings, SpatialSettings
 
 SEEN = 1.2  # standard deviation of a seen command, over that of the angle of a disk
 LEAST_SEEN = 1e-3  # of such a standard deviation, where there is no noise [a]
@@ -62,6 +62,7 @@ class RobotEstimator:
     def __init__(self, settings: Settings | SpatialSettings, count: int) -> None:
         self._robot, self._actuation = settings.robot, settings.actuation
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
+        self._tension_span = settings.tension_span
         sensing = settings.sensors or EXACT
         candidates, commands = Candidates.of(sensing), settings.actuation.matrix.shape[1]
         self._candidates = candidates
@@ -128,7 +129,7 @@ class RobotEstimator:
         if "tension" not in observation:
             zero = np.zeros(observation["cable"].shape)
             return zero, zero, zero
-        measured, free = (TENSION_SPAN * observation[key].astype(float) for key in ("tension", "free_tension"))
+        measured, free = (self._tension_span * observation[key].astype(float) for key in ("tension", "free_tension"))
         return self._actuation.forces(measured), free, observation["lever"].astype(float)
 
     def _virtual_work(

@@ -4,7 +4,7 @@ import math
 import os
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -114,9 +114,21 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             check_clear(robot, scene, self._straight_gaps(robot, scene))
         made = self._kernel_robot(own) if changes and own is not None else None
         with self._exclusive:
-            self._kernel_batch.set_obstacles(index, compiled)
+            self._put(index, scene, compiled)
             self._become(index, own, made)
-            self._scenes[index] = scene
+            self._unrested.add(index)
+
+    def assign_alike(self, index: int, other: Self) -> None:
+        """Assign the scene and the robot at an index of another batch of an equal robot, as :meth:`assign`, but faster.
+
+        Raises:
+            ValueError: If there is no scene, and as :meth:`assign`.
+        """
+        scene, robot = other.scene(index), other._robots[index]
+        if robot != self._robots[index] or other.layout.obstacles != self.layout.obstacles:
+            return self.assign(index, scene, robot)
+        with self._exclusive:
+            self._put(self._check_index(index), scene, other._compiled[index])
             self._unrested.add(index)
 
     def leaves_clear(self, scene: Scene, robot: RobotT_co | None = None) -> bool:

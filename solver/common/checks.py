@@ -8,6 +8,7 @@ import numpy as np
 from solver.common.equilibrium import BaseEquilibrium
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
+from solver.common.status import Status
 from solver.common.validation import check_instance, shown
 
 SPRINGS = (1e-10, 1e10)  # stiffness of an obstacle's spring, over EI/L³ of the robot
@@ -19,10 +20,13 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
     Raises:
         ValueError: Naming the obstacle, its inner radius and what the robot needs.
     """
+    longest = max(robot.edges_mm)
     for obstacle in scene:
+        inradius = obstacle.extent.inradius
+        if 2 * inradius > longest:
+            continue
         touchable = obstacle.touchable(robot.segments + 1)
-        inradius, longest = obstacle.extent.inradius, max(robot.edges_mm)
-        if (touchable[1:] & touchable[:-1]).any() and not 2 * inradius > longest:
+        if (touchable[1:] & touchable[:-1]).any():
             between = math.floor(longest * (robot.between + 1) / (2 * inradius))
             raise ValueError(
                 f"the largest disc or ball in {shown(obstacle)} has the radius {inradius:.6g} mm; it could slip "
@@ -43,11 +47,18 @@ def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
 
 
 def check_rest(rest: BaseEquilibrium[AnyRobot]) -> None:
-    """Check that no obstacle overlaps the robot at rest; one that its loads press it against is met to roundoff.
+    """Check that the motors hold the robot at rest, and that no obstacle overlaps it.
+
+    An obstacle that its loads press it against is met to roundoff.
 
     Raises:
-        ValueError: As :func:`check_clear`.
+        ValueError: As :func:`check_clear`, or naming the tension limit that its loads exceed.
     """
+    if rest.status is Status.STALLED and rest.robot.least_cable_mm == 0:  # others pay out what they cannot hold
+        raise ValueError(
+            f"max_tension is {rest.robot.max_tension:.6g} N; at rest the loads of the robot pull its only cable, which "
+            "cannot be paid out below 0, with more: raise max_tension, lower loads or weight, or add an opposed cable"
+        )
     check_clear(rest.robot, rest.scene, np.where(rest.contact, 0.0, rest.gaps))
 
 

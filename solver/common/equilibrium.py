@@ -216,18 +216,14 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
             Unknowns, parameters, multipliers of the equalities, by least squares, and of the inequalities.
         """
         unknowns, parameters = self._node_point()
-        balance, equality_slopes = self._balance(self._node_derivatives(unknowns, parameters))
+        balance, equality_slopes = self._balance(self._derivatives(unknowns, parameters))
         return unknowns, parameters, _tensions(balance, equality_slopes), self.inequality_multipliers
 
-    def _node_derivatives(self, unknowns: np.ndarray, parameters: np.ndarray) -> list[np.ndarray]:
-        return [value.full() for value in self._derivatives(unknowns, parameters)]
-
-    def _balance(self, derivatives: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _balance(self, derivatives: tuple[ca.DM, ...]) -> tuple[np.ndarray, np.ndarray]:
         """Return the objective's slope less the contact forces, and the slopes of the equalities that balance it."""
         slope, _, equality_slopes, _, gap_slopes = derivatives
-        multipliers = self.inequality_multipliers
-        pushed = gap_slopes.T @ multipliers if multipliers.size else 0.0
-        return slope.ravel() - pushed, equality_slopes
+        pushed = gap_slopes.T @ ca.DM(self.inequality_multipliers)
+        return (slope - pushed).full().ravel(), _full(equality_slopes)
 
     def residuals(self) -> Residuals:
         """Recompute the optimality conditions of the node-coordinate problem from the shape and multipliers alone.
@@ -235,16 +231,16 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
         The derivatives are those of the node-coordinate problem, which shares nothing with the solver's reduced
         coordinates.
         """
-        derivatives = self._node_derivatives(*self._node_point())
+        derivatives = self._derivatives(*self._node_point())
         _, lengths, _, gaps, _ = derivatives
         balance, equality_slopes = self._balance(derivatives)
         tensions, multipliers = _tensions(balance, equality_slopes), self.inequality_multipliers
         touchable = np.isfinite(self.gaps[:, :, 1:].ravel())
         touchable = np.concatenate([np.ones(multipliers.size - touchable.size, bool), touchable])
-        clearance = gaps.ravel()[touchable]
+        clearance = gaps.full().ravel()[touchable]
         return Residuals(
             stationarity=float(np.abs(balance - equality_slopes.T @ tensions).max()),
-            lengths=float(np.abs(lengths).max()),
+            lengths=float(np.abs(lengths.full()).max()),
             gaps=float(max(0.0, -clearance.min(initial=0.0))),
             complementarity=float(np.abs(multipliers[touchable] * clearance).max(initial=0.0)),
             sign=float(max(0.0, -multipliers.min(initial=0.0))),
@@ -278,6 +274,13 @@ def _check_block(block: np.ndarray, layout: Layout, robot: AnyRobot) -> None:
             raise ValueError(f"{name} in block is {np.abs(part).max():.6g}; it must be at most {bound:.6g}: {remedy}")
     if layout.multipliers(block).min(initial=0.0) < 0:
         raise ValueError(f"a multiplier in block is negative; none may be: {remedy}")
+
+
+def _full(matrix: ca.DM) -> np.ndarray:
+    """Return a sparse matrix as an array; ``matrix.full()`` would take long over its many zeros."""
+    full, sparsity = np.zeros(matrix.shape), matrix.sparsity()
+    full[sparsity.get_triplet()] = matrix.nonzeros()
+    return full
 
 
 def _tensions(balance: np.ndarray, equality_slopes: np.ndarray) -> np.ndarray:

@@ -105,7 +105,35 @@ def clearance_function(law: GapLaw) -> ca.Function:
     return ca.Function(f"ccr_{law.kind}_clearance", [point, shape], [ca.cse(law.gap(point, shape))])
 
 
-def gaps_of(law: GapLaw, points: ca.MX, shape: ca.MX) -> ca.MX:
-    """Return the gaps of points, given as columns, to an obstacle."""
-    count = points.shape[1]
-    return clearance_function(law).map(count)(points, ca.repmat(shape, 1, count)).T
+@lru_cache(maxsize=64)
+def slope_function(law: GapLaw) -> ca.Function:
+    """Return ``(p, shape) → c_p`` of one kind of obstacle."""
+    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
+    slope = ca.densify(ca.gradient(law.gap(point, shape), point))
+    return ca.Function(f"ccr_{law.kind}_slope", [point, shape], [ca.cse(slope)])
+
+
+class PointGaps(NamedTuple):
+    """Gaps of points to an obstacle.
+
+    Attributes:
+        law: Gap law of the obstacle.
+        points: The points, as columns ``(d, k)``, in the frame of the obstacle [mm].
+        shape: Shape parameters of the obstacle.
+    """
+
+    law: GapLaw
+    points: ca.MX
+    shape: ca.MX
+
+    def values(self) -> ca.MX:
+        """Return the gaps, ``(k, 1)`` [mm]."""
+        return self._map(clearance_function(self.law)).T
+
+    def slopes(self) -> ca.MX:
+        """Return the slopes of the gaps in their points, as columns ``(d, k)``."""
+        return self._map(slope_function(self.law))
+
+    def _map(self, function: ca.Function) -> ca.MX:
+        count = self.points.shape[1]
+        return function.map(count)(self.points, ca.repmat(self.shape, 1, count))

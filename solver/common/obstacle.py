@@ -171,23 +171,26 @@ class Obstacle(ABC):
         """
         length_mm = check_positive("length_mm", length_mm)
         largest, smallest = FARTHEST * length_mm, SHARPEST * length_mm
-        remedy = (
-            f"{largest:.6g} mm, {FARTHEST:g} times the robot's longest length, or rounding of its gap would exceed the "
-            "solver's tolerance; use a HalfPlane, in space a HalfSpace, for a wall, or leave out what the robot cannot "
-            "reach"
-        )
         for name, point in self._points():
             distance = math.hypot(*point)
             if distance > largest:
-                raise ValueError(f"{name} of {shown(self)} is {distance:.6g} mm from the base, beyond {remedy}")
+                raise self._too_large(f"{name} of {shown(self)} is {distance:.6g} mm from the base", largest)
         for name, size in self._radii():
             if size > largest:
-                raise ValueError(f"{name} of {shown(self)} is {size:.6g} mm, beyond {remedy}")
+                raise self._too_large(f"{name} of {shown(self)} is {size:.6g} mm", largest)
             if size < smallest:
                 raise ValueError(
                     f"{name} of {shown(self)} is {size:.6g} mm; it must be at least {smallest:.6g} mm, {SHARPEST:g} of "
                     "the robot's longest length: round it more"
                 )
+
+    @staticmethod
+    def _too_large(what: str, largest: float) -> ValueError:
+        return ValueError(
+            f"{what}, beyond {largest:.6g} mm, {FARTHEST:g} times the robot's longest length, or rounding of its gap "
+            "would exceed the solver's tolerance; use a HalfPlane, in space a HalfSpace, for a wall, or leave out what "
+            "the robot cannot reach"
+        )
 
     def _points(self) -> list[tuple[str, Point]]:
         """Return its points with their names."""

@@ -150,16 +150,17 @@ def check_point_count(robot: AnyRobot, count: int) -> None:
         )
 
 
-def check_cable_limit(robot: AnyRobot, default: float) -> None:
-    """Fill in the largest cable displacement, and check that it is not negligible.
+def check_cable_limit(robot: AnyRobot) -> None:
+    """Check that the largest cable displacement is not negligible.
 
     Raises:
         ValueError: Naming the value and the bound.
     """
-    largest = default if robot.max_cable_mm is None else check_positive("max_cable_mm", robot.max_cable_mm)
+    if robot.max_cable_mm is not None:
+        object.__setattr__(robot, "max_cable_mm", check_positive("max_cable_mm", robot.max_cable_mm))
     least = LEAST_CABLE * robot.offset_mm
-    check_number("max_cable_mm", largest, least, math.inf, f"at least {least:.6g}, {LEAST_CABLE} of offset_mm")
-    object.__setattr__(robot, "max_cable_mm", largest)
+    bound = f"at least {least:.6g}, {LEAST_CABLE} of offset_mm"
+    check_number("max_cable_mm", robot.cable_limit_mm, least, math.inf, bound)
 
 
 def check_model(model: object) -> None:

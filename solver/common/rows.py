@@ -1,9 +1,9 @@
 """Rows of a batch: the robots it moves, each with its scene and equilibrium, taken out and put back."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, NamedTuple, Self
+from collections.abc import Iterable, Sequence
+from operator import attrgetter
+from typing import Any, ClassVar, Generic, NamedTuple, Self, cast
 
 import numpy as np
 
@@ -18,10 +18,10 @@ from solver.common.validation import check_instance, check_sequence, check_whole
 Kernel = Any  # a batch or a scene of the kernel, whose classes for the plane and for space share no base
 SIZES = ("model", "segments", "number of cables", "number of lines that can touch", "positions")
 NUMBERS = ("blocks", "statuses", "iterations", "factorizations", "commands")
+NUMBERS_OF = attrgetter(*NUMBERS)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class Rows(NamedTuple):
     """States of robots of a batch: all that their next step depends on.
 
     Attributes:
@@ -47,9 +47,11 @@ class Rows:
     commands: np.ndarray
 
 
-def copied(array: np.ndarray, at: slice | list[int]) -> np.ndarray:
-    """Return a copy of rows of an array."""
-    return np.asarray(array[at].copy() if isinstance(at, slice) else array[at])
+def copies(arrays: Iterable[np.ndarray], at: slice | list[int]) -> list[np.ndarray]:
+    """Return copies of the same rows of arrays."""
+    if isinstance(at, slice):
+        return [array[at].copy() for array in arrays]
+    return [array[at] for array in arrays]
 
 
 def as_slice(indices: list[int]) -> slice | list[int]:
@@ -91,6 +93,7 @@ class RowBatch(ABC, Generic[RobotT_co]):
         self.commands = np.zeros((count, self.cables + 1))
         self._robots: list[RobotT_co | None] = [None] * count  # those that differ from the batch's
         self._scenes: list[Scene | None] = [None] * count
+        self._compiled: list[Kernel] = [None] * count  # the same as the kernel takes them
         self._limits = np.tile(_limits(robot), (count, 1))  # of each robot, as _limits returns them
         self._others: set[int] = set()  # whose robots differ from the batch's
         least, most, *_ = _limits(robot)
@@ -129,14 +132,13 @@ class RowBatch(ABC, Generic[RobotT_co]):
         Raises:
             ValueError: If an index is out of range.
         """
-        indices = list(map(self._check_index, check_sequence("robots", robots, "a list of indices")))
+        indices = list(map(self._check_index, _listed(robots)))
         at = as_slice(indices)
         with self._exclusive:
-            numbers = [copied(getattr(self, name), at) for name in NUMBERS]
             rested = np.array([index not in self._unrested for index in indices], bool)
-            own = tuple(self._robots[index] for index in indices)
-            scenes = tuple(self._scenes[index] for index in indices)
-            return Rows(self.robot, own, scenes, rested, *numbers)
+            own = tuple([self._robots[index] for index in indices])
+            scenes = tuple([self._scenes[index] for index in indices])
+            return Rows(self.robot, own, scenes, rested, *copies(NUMBERS_OF(self), at))
 
     def set_rows(self, robots: Sequence[int], rows: Rows) -> None:
         """Put robots into states of :meth:`get_rows`, from which they go on as those robots would, bit for bit.
@@ -156,23 +158,28 @@ class RowBatch(ABC, Generic[RobotT_co]):
         self._check_rows(rows, len(indices))
         entries = list(zip(indices, rows.robots, rows.scenes, rows.rested.tolist(), strict=True))
         changed = [entry[:3] for entry in entries if entry[1:3] != (self._robots[entry[0]], self._scenes[entry[0]])]
+        compiled, made = self._prepare(changed) if changed else ({}, {})
+        with self._exclusive:
+            for index, robot, scene in changed:
+                self._become(index, robot, None if robot is None else made.get(robot))
+                if scene is None:
+                    self._scenes[index] = None
+                else:
+                    self._put(index, scene, compiled[robot, scene])
+            for index, _, scene, rested in entries:
+                (self._unrested.discard if rested and scene is not None else self._unrested.add)(index)
+            at = as_slice(indices)
+            for own, given in zip(NUMBERS_OF(self), cast("Any", rows[-len(NUMBERS) :]), strict=True):
+                own[at] = given
+
+    def _prepare(self, changed: list[tuple[int, Any, Scene | None]]) -> tuple[dict[Any, Kernel], dict[Any, Kernel]]:
+        """Return scenes, by robot and scene, and robots that indices are to have, as the kernel takes them."""
         others = {robot for index, robot, _ in changed if robot is not None and robot != self._robots[index]}
         for other in others:
             self._check_own(other)
         places = {(robot, scene) for _, robot, scene in changed if scene is not None}
         compiled = {(robot, scene): self._compile(robot or self.robot, scene) for robot, scene in places}
-        made = {other: self._kernel_robot(other) for other in others}
-        with self._exclusive:
-            for index, robot, scene in changed:
-                if scene is not None:
-                    self._kernel_batch.set_obstacles(index, compiled[robot, scene])
-                self._become(index, robot, None if robot is None else made.get(robot))
-                self._scenes[index] = scene
-            for index, _, scene, rested in entries:
-                (self._unrested.discard if rested and scene is not None else self._unrested.add)(index)
-            at = as_slice(indices)
-            for name in NUMBERS:
-                getattr(self, name)[at] = getattr(rows, name)
+        return compiled, {other: self._kernel_robot(other) for other in others}
 
     def _become(self, index: int, robot: Any, made: Kernel) -> None:
         """Make a robot of the batch another one, given as the kernel takes it too; ``None`` for the batch's."""
@@ -208,14 +215,14 @@ class RowBatch(ABC, Generic[RobotT_co]):
             TypeError: If they are no rows.
         """
         check_instance("rows", rows, Rows, "take those of get_rows")
-        if rows.robot != self.robot:
+        if rows.robot is not self.robot and rows.robot != self.robot:
             raise ValueError("the rows are of another robot; take those of a batch of an equal robot")
         if len(rows.robots) != count:
             raise ValueError(f"rows has {len(rows.robots)} robots; it must have one for each of the {count} robots")
         if len(rows.scenes) != count or np.shape(rows.rested) != (count,):
             raise ValueError(f"rows has {len(rows.scenes)} scenes; it must have one for each of the {count} robots")
-        for name in NUMBERS:
-            numbers, present = np.asarray(getattr(rows, name)), getattr(self, name)
+        given = cast("Any", rows[-len(NUMBERS) :])
+        for name, numbers, present in zip(NUMBERS, given, NUMBERS_OF(self), strict=True):
             if numbers.shape != (count, *present.shape[1:]) or numbers.dtype != present.dtype:
                 raise ValueError(
                     f"{name} of rows has the shape {numbers.shape} of {numbers.dtype}; it must be "
@@ -245,8 +252,12 @@ class RowBatch(ABC, Generic[RobotT_co]):
         reached = self.scene(motion.robot).moved_towards(motion.scene, part)
         robot = self.robot_of(motion.robot)
         compiled = motion.obstacles if part == 1 else self._kernel_obstacles(robot, reached)
-        self._kernel_batch.set_obstacles(motion.robot, compiled)
-        self._scenes[motion.robot] = reached
+        self._put(motion.robot, reached, compiled)
+
+    def _put(self, index: int, scene: Scene, compiled: Kernel) -> None:
+        """Put a robot among the obstacles of a scene, given as the kernel takes them too."""
+        self._kernel_batch.set_obstacles(index, compiled)
+        self._scenes[index], self._compiled[index] = scene, compiled
 
     def _compile(self, robot: Any, scene: Scene) -> Kernel:
         """Return the obstacles of a scene around a robot as the kernel takes them.
@@ -297,7 +308,7 @@ class RowBatch(ABC, Generic[RobotT_co]):
 
     def _check_indices(self, robots: Sequence[int]) -> list[int]:
         """Return indices of robots, each named once."""
-        indices = list(map(self._check_index, check_sequence("robots", robots, "a list of indices")))
+        indices = list(map(self._check_index, _listed(robots)))
         if len(set(indices)) != len(indices):
             raise ValueError(f"robots is {shown(robots)}; it must name each robot once")
         return indices
@@ -316,6 +327,15 @@ class RowBatch(ABC, Generic[RobotT_co]):
             raise ValueError(
                 f"robot {robot} has a new scene, or its rest was interrupted; call rest([{robot}]) before it moves"
             )
+
+
+def _listed(robots: Sequence[int]) -> Sequence[object]:
+    """Return indices of robots, which may be of another type, to be checked one by one.
+
+    Raises:
+        ValueError: If they are no sequence.
+    """
+    return robots if type(robots) is list else check_sequence("robots", robots, "a list of indices")
 
 
 def _limits(robot: AnyRobot) -> tuple[float, ...]:

@@ -28,7 +28,7 @@ class Trace(NamedTuple):
     reason: str
 
 
-def read_trace(traced: tuple[list[float], _kernel.Reason], robot: AnyRobot, scene: Scene, space: int) -> Trace:
+def read_trace(traced: tuple[np.ndarray, _kernel.Reason], robot: AnyRobot, scene: Scene, space: int) -> Trace:
     """Return the shapes that the kernel wrote one after the other, with the reason."""
     parts = ((robot.segments + 1, 3), (len(robot.lines_mm), robot.positions, space), (len(scene), space))
     ends = np.cumsum([math.prod(part) for part in parts])

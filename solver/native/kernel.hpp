@@ -97,14 +97,14 @@ class Kernel {
     return {result.status, result.iterations, result.factorizations, result.scene};
   }
 
-  std::tuple<std::vector<double>, Reason> trace(const Input& from, const std::vector<double>& command) {
+  std::tuple<Array, Reason> trace(const Input& from, const std::vector<double>& command) {
     require_block(from);
     require_target(command);
     std::vector<double> shapes, to(block_size());
     const Lease continuation(*this);
     const StepResult result = continuation->trace(from.data(), command.data(), to.data(), shapes);
     if (result.interrupted) throw nb::python_error();
-    return {std::move(shapes), result.reason};
+    return {to_array(std::move(shapes)), result.reason};
   }
 
   Numbers<3> optimality(const Input& block) {

@@ -26,9 +26,17 @@ using Blocks = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Counts = nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Array = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
 
 template <int D>
 using Numbers = std::array<double, D>;
+
+// Hands numbers over to Python without copying them.
+inline Array to_array(std::vector<double> numbers) {
+  auto* const owned = new std::vector<double>(std::move(numbers));
+  nb::capsule owner(owned, [](void* held) noexcept { delete static_cast<std::vector<double>*>(held); });
+  return Array(owned->data(), {owned->size()}, owner);
+}
 
 inline void require(bool condition, const std::string& message) {
   if (!condition) throw std::invalid_argument(message);

@@ -19,10 +19,10 @@ import casadi as ca
 from solver.common.gap_laws import (
     TINY,
     GapLaw,
+    PointGaps,
     Symbol,
     capsule_gap,
     circle_gap,
-    gaps_of,
     half_plane_gap,
     sinc_and_cosine,
     sinc_and_slopes,
@@ -226,8 +226,8 @@ def node_problem(
             shift = shift + moved
         for line in robot.lines_mm:
             points = subdivide(shape_now.line(line / robot.offset_mm), robot.between)[:, 1:]
-            gaps.append(gaps_of(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
-    return NodeProblem(unknowns, parameters, energy, equalities.T, ca.vertcat(limits, *gaps))
+            gaps.append(PointGaps(law, turn.T @ (points - ca.repmat(shift, 1, points.shape[1])), shape))
+    return NodeProblem(unknowns, parameters, energy, equalities.T, limits, gaps)
 
 
 def robot_inequality_count(robot: Robot) -> int:

@@ -92,11 +92,11 @@ class Robot:
     def _check_cable_limit(self) -> None:
         # The equal shares of the paper's model take from every segment alike, also at its shortest.
         longest = self.shortest_mm if self.model == "paper" else self.longest_mm
-        check_cable_limit(self, min(math.pi * self.offset_mm, 0.5 * longest))
+        check_cable_limit(self)
         bound = min(longest, 2 * self.segments * self.offset_mm)
         if not self.cable_limit_mm < bound:
             raise ValueError(
-                f"max_cable_mm is {self.max_cable_mm}; it must be below {bound} "
+                f"max_cable_mm is {self.cable_limit_mm}; it must be below {bound} "
                 f"(the backbone's {'shortest ' if self.model == 'paper' else ''}length, and the disks' reach 2·n·a)"
             )
 
@@ -234,8 +234,9 @@ class Robot:
     @property
     def cable_limit_mm(self) -> float:
         """``max_cable_mm`` with its default filled in [mm]."""
-        assert self.max_cable_mm is not None
-        return self.max_cable_mm
+        if self.max_cable_mm is not None:
+            return self.max_cable_mm
+        return min(math.pi * self.offset_mm, 0.5 * (self.shortest_mm if self.model == "paper" else self.longest_mm))
 
 
 @lru_cache(maxsize=64)

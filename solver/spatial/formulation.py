@@ -220,7 +220,7 @@ def node_problem(
     energy, gaps = obstacle_terms(symbols, pose.touching_lines(robot), robot.between, energy_scale)
     for disk in pose.disks:
         energy += ca.sum2(_square_angles(disk, robot.offset_mm))
-    return NodeProblem(unknowns, parameters, energy, _equalities(robot, pose, signs, commands), gaps)
+    return NodeProblem(unknowns, parameters, energy, _equalities(robot, pose, signs, commands), ca.MX(0, 1), gaps)
 
 
 class _Pose(NamedTuple):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from solver.common.gap_laws import GapLaw, gaps_of
+from solver.common.gap_laws import GapLaw, PointGaps
 from solver.common.node_problem import grow, subdivide
 
 MOTIONS = 7  # components of an obstacle's change: shift, turns, growth
@@ -37,8 +37,8 @@ def parameter_count(laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> int:
 
 def obstacle_terms(
     symbols: ObstacleSymbols, lines: list[ca.MX], between: int, energy_scale: ca.MX
-) -> tuple[ca.MX, ca.MX]:
-    """Return the energy of the springs over ``B = EI / 2 l0`` [rad²], and the gaps of the points of lines [mm].
+) -> tuple[ca.MX, list[PointGaps]]:
+    """Return the energy of the springs over ``B = EI / 2 l0`` [rad²], and the gaps of the points of lines.
 
     The gaps are ordered (obstacle, line, position), without node 0.
     """
@@ -47,7 +47,7 @@ def obstacle_terms(
     displacements = ca.reshape(displacements, 3, -1)
     springs = ca.reshape(parameters[starts[-1] :], SPRING_SIZE, -1)
     points = [subdivide(line, between)[:, 1:] for line in lines]
-    energy, gaps = ca.MX(0), []
+    energy, gaps = ca.MX(0), list[PointGaps]()
     for j, law in enumerate(laws):
         own = None if change is None else change[MOTIONS * j : MOTIONS * (j + 1)]
         shape, shift, turn = _moved(law, parameters[starts[j] : starts[j + 1]], own)
@@ -56,8 +56,8 @@ def obstacle_terms(
             moved = displacements[:, mount]
             energy += _twice_spring_energy(springs[:, mount], moved) / (2 * energy_scale)
             shift = shift + moved
-        gaps += [gaps_of(law, turn.T @ (line - ca.repmat(shift, 1, line.shape[1])), shape) for line in points]
-    return energy, ca.vertcat(*gaps) if gaps else ca.MX(0, 1)
+        gaps += [PointGaps(law, turn.T @ (line - ca.repmat(shift, 1, line.shape[1])), shape) for line in points]
+    return energy, gaps
 
 
 def _moved(law: GapLaw, shape: ca.MX, change: ca.MX | None) -> tuple[ca.MX, ca.MX, ca.MX]:

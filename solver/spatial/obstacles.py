@@ -87,9 +87,12 @@ class HalfSpace(SpatialObstacle):
         return Extent(self.point, math.inf, math.inf, math.inf)
 
     def outline(self) -> np.ndarray:
-        """Return the corners of a square of the surface around the point, 60 mm wide, ``(2, 2, 3)`` [mm]."""
+        """Return the corners of a square of the surface around the point, ``(2, 2, 3)`` [mm].
+
+        It is twice as wide as the point is far from the base, the only length that a wall has.
+        """
         _, first, second = _axes(np.array(self.normal))
-        ends = np.array([-30.0, 30.0])
+        ends = math.hypot(*self.point) * np.array([-1.0, 1.0])
         return np.asarray(self.point + ends[:, None, None] * first + ends[None, :, None] * second)
 
 

@@ -126,13 +126,13 @@ class SpatialRobot:
         assign(self, "torsion_ratio", checked if is_listed(given) else checked[0])
 
     def _check_cable_limit(self) -> None:
-        check_cable_limit(self, min(math.pi * self.offset_mm, self.length_mm) / (2 if self.model == "paper" else 1))
+        check_cable_limit(self)
         if self.model == "rod":
             return
         bound = min(self.length_mm, self.segments * self.offset_mm * abs(math.sin(self.angle)))
         if not self.cable_limit_mm < bound:
             raise ValueError(
-                f"max_cable_mm is {self.max_cable_mm}; it must be below {bound:.6g} "
+                f"max_cable_mm is {self.cable_limit_mm}; it must be below {bound:.6g} "
                 "(the backbone's length, and the disks' reach n·a·|sin angle|)"
             )
 
@@ -166,8 +166,9 @@ class SpatialRobot:
     @property
     def cable_limit_mm(self) -> float:
         """``max_cable_mm`` with its default filled in [mm]."""
-        assert self.max_cable_mm is not None
-        return self.max_cable_mm
+        if self.max_cable_mm is not None:
+            return self.max_cable_mm
+        return min(math.pi * self.offset_mm, self.length_mm) / (2 if self.model == "paper" else 1)
 
     @property
     def holes(self) -> np.ndarray:
@@ -201,8 +202,7 @@ class SpatialRobot:
     @property
     def lines(self) -> int:
         """Number of lines of points."""
-        counts = {"backbone": 1, "holes": len(self.cable_holes_mm), "rim": self.rim_points}
-        return sum(counts[line] for line in self.touch)
+        return len(self.lines_mm)
 
     @property
     def least_cable_mm(self) -> float:

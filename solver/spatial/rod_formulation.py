@@ -74,9 +74,9 @@ def rod_node_problem(
     symbols = ObstacleSymbols(laws, mounted, unknowns[12 * n :], parameters[cables + 2 :], moved)
     lines = [shape.line(x, y) for x, y in robot.lines_mm / robot.offset_mm]
     springs, gaps = obstacle_terms(symbols, lines, robot.between, energy_scale)
-    inequalities = ca.vertcat(*_slacks(robot, shape, commands, segment), _disk_gaps(robot, shape, segment), gaps)
+    limits = ca.vertcat(*_slacks(robot, shape, commands, segment), _disk_gaps(robot, shape, segment))
     objective = _energy(robot, shape) + springs - _work(robot, shape, segment) / energy_scale
-    return NodeProblem(unknowns, parameters, objective, _equalities(robot, shape, segment), inequalities)
+    return NodeProblem(unknowns, parameters, objective, _equalities(robot, shape, segment), limits, gaps)
 
 
 def _shape(robot: SpatialRobot, unknowns: ca.MX) -> _Shape:

@@ -63,3 +63,17 @@ def test_force_vectors_are_goals_of_as_many_numbers():
     assert observation["desired_goal"].shape == (3,)
     unit = FORCE_SPAN * env.settings.scales.force_n
     assert unit * observation["desired_goal"] == pytest.approx(info["desired_force"], abs=1e-6)
+
+
+@pytest.mark.parametrize("sensing", ["realistic", "sensorless"])
+def test_what_is_observed_beside_the_goals_is_what_sensors_tell(sensing):
+    goal, flat = (
+        gymnasium.make("CCR/PushObstacle-v1", obs_mode=mode, sensing=sensing).unwrapped for mode in ("goal", "flat")
+    )
+    seen, row, pressed = goal.reset(seed=1)[0], flat.reset(seed=1)[0], 0
+    for _ in range(28):
+        assert np.array_equal(seen["observation"], row)
+        pressed += bool(seen["achieved_goal"] > 0)
+        assert seen["achieved_goal"] in (0, 1) or seen["achieved_goal"] not in row  # what sensors tell is not exact
+        seen, row = (env.step(np.array([0.8], np.float32))[0] for env in (goal, flat))
+    assert pressed > 5

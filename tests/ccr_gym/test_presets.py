@@ -66,3 +66,13 @@ def test_a_robot_in_space_needs_no_opposed_cables():
         x, y, _ = env.equilibrium.scene.obstacles[0].extent.center
         assert x > -20
         assert y > -20
+
+
+def test_tensions_of_two_sections_stay_within_their_scale():
+    """Even where motors are at their limit and the robot is twice as stiff as it is thought to be."""
+    env = gymnasium.make("CCR/PushObstacle-v1", robot="neuroendoscope", sensing={"rigidity_ratio": (2, 2)}).unwrapped
+    env.reset(seed=0)
+    steps = [env.step(np.ones(2, np.float32)) for _ in range(32)]
+    tensions = np.array([observation[env.observation_slices["tension"]] for observation, *_ in steps])
+    assert steps[-1][-1]["solver_status"] == Status.STALLED
+    assert 0.5 < tensions.max() < 1

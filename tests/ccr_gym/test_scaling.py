@@ -16,7 +16,7 @@ CLOSE = 1e-5
 
 def scaled(robot, s):
     """Return a robot s times as large."""
-    lengths = {name: s * getattr(robot, name) for name in ("length_mm", "offset_mm", "max_cable_mm")}
+    lengths = {name: s * getattr(robot, name) for name in ("length_mm", "offset_mm")}
     if robot.model == "rod":
         offsets = [cable.offset_mm or robot.offset_mm for cable in robot.cables]
         lengths["cables"] = tuple(replace(c, offset_mm=s * a) for c, a in zip(robot.cables, offsets, strict=True))
@@ -61,3 +61,20 @@ def test_episodes_do_not_depend_on_the_size_of_the_robot(env_id, sensing, s):
 def test_nor_do_those_of_several_sections(preset, task):
     env_id = f"CCR/{task}-v1"
     compare(env_id, gymnasium.make(env_id, robot=preset).unwrapped.settings.robot, 0.1, "ideal", 24)
+
+
+@pytest.mark.parametrize("preset", ["rao_2021", "snake-arm"])
+@pytest.mark.parametrize("s", [0.1, 10])
+def test_nor_does_which_of_two_pulled_cables_yields_to_an_obstacle_that_moves(preset, s):
+    def tensions(robot):
+        env = gymnasium.make("CCR/MovingObstacle-v1", robot=robot, sensing="realistic")
+        generator = np.random.default_rng(4)
+        mean = generator.uniform(0, 0.8, env.action_space.shape)
+        env.reset(seed=4)
+        actions = (np.clip(mean + generator.normal(0, 0.5, mean.shape), -1, 1) for _ in range(60))
+        return np.array([env.step(action.astype(np.float32))[-1]["tension"] for action in actions])
+
+    robot = gymnasium.make("CCR/MovingObstacle-v1", robot=preset).unwrapped.settings.robot
+    here, there = tensions(robot), tensions(scaled(robot, s))
+    assert here.max() == pytest.approx(robot.max_tension)  # a motor is at its limit
+    assert np.abs(here - there).max() <= CLOSE * robot.max_tension

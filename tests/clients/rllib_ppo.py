@@ -20,7 +20,7 @@ if __name__ == "__main__":
     ray.init(num_cpus=2, include_dashboard=False, object_store_memory=200_000_000, log_to_driver=False)
     ppo = {"train_batch_size_per_learner": 256, "minibatch_size": 64, "num_epochs": 1}
     steps = [train(PPOConfig().training(**ppo), env_id) for env_id in IDS]
-    steps.append(train(PPOConfig().training(**ppo), IDS[0], robot="snake-arm", sensing="realistic"))
+    steps.append(train(PPOConfig().training(**ppo), IDS[0], robot="snake_arm", sensing="realistic"))
     sac = SACConfig().training(train_batch_size_per_learner=64, num_steps_sampled_before_learning_starts=64)
     steps.append(train(sac, IDS[-1]))
     assert all(steps), steps

@@ -1,4 +1,4 @@
-"""The long soak: ``python -m soak --steps 3000000``."""
+"""The long soak: ``python -m soak --steps 3000000``; interrupted, it goes on with ``--resume``."""
 
 import argparse
 import json
@@ -25,11 +25,25 @@ class Report:
     """Findings so far, written to a folder."""
 
     def __init__(self, folder, models):
-        self.folder, self.began = folder, time.time()
+        self.folder, self.began, self.finished = folder, time.time(), folder / "episodes.jsonl"
         self.tallies, self.cases, self.kept = {model: Tally() for model in models}, [], Counter()
 
-    def add(self, model, tally, found):
+    def begin(self, episodes, resume):
+        """Return the episodes yet to be played: all, or those that the run before this one did not finish."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        text = self.finished.read_text() if resume and self.finished.exists() else ""
+        self.finished.write_text("")
+        rows = {Episode(*row[0]): row for row in map(json.loads, text.split("\n")[:-1])}  # the last may be cut off
+        for episode in (episode for episode in episodes if episode in rows):
+            _, tally, found = rows[episode]
+            self.add(episode, Tally.load(tally), found)
+        return [episode for episode in episodes if episode not in rows]
+
+    def add(self, episode, tally, found):
         """Add an episode; only some cases of each kind of finding are kept."""
+        with self.finished.open("a") as file:
+            file.write(json.dumps([episode, vars(tally), found]) + "\n")
+        model = episode.model
         self.tallies[model].add(tally)
         for case in found:
             self.kept[model, case["kind"]] += 1
@@ -38,7 +52,6 @@ class Report:
 
     def write(self):
         """Write ``soak.json``, ``soak.md`` and ``cases.json``."""
-        self.folder.mkdir(parents=True, exist_ok=True)
         tallies = {model: tally.as_dict() for model, tally in self.tallies.items()}
         report = {"seconds": time.time() - self.began, "tallies": tallies}
         (self.folder / "soak.json").write_text(json.dumps(report, indent=1))
@@ -56,11 +69,12 @@ def main():
     options = _options()
     if options.case:
         sys.exit(_replay(*options.case))
-    report, episodes = Report(options.out, options.models), _episodes(options)
+    report = Report(options.out, options.models)
+    episodes = report.begin(_episodes(options), options.resume)
     with ProcessPoolExecutor(options.processes) as pool:
         played = zip(episodes, pool.map(play, episodes, chunksize=4), strict=True)
         for count, (episode, (tally, found)) in enumerate(played, 1):
-            report.add(episode.model, tally, found)
+            report.add(episode, tally, found)
             if count % (-(-len(episodes) // REPORTS)) == 0:
                 print(
                     f"{count / len(episodes):.0%}: {dict(report.kept) or 'nothing found'}", file=sys.stderr, flush=True
@@ -96,6 +110,7 @@ def _options():
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("runs/soak"), help="folder of the report and the cases")
+    parser.add_argument("--resume", action="store_true", help="go on with the run in this folder that was interrupted")
     parser.add_argument("--case", nargs=2, metavar=("FILE", "INDEX"), help="replay one case of cases.json")
     return parser.parse_args()
 

@@ -6,14 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from soak.cores import CoreCheck, line_points
+from soak.cores import CoreCheck
 from soak.shapes import distance
-from soak.walks import command_of, step
+from soak.walks import Numbers, command_of, step
 from solver import Robot, Status
 
 FAR = 0.5  # of the shortest edge: a step that moves a point farther is checked between its accepted shapes
 CERTIFY_EVERY = 1000
 MOST_FACTORIZATIONS = 5000
+WORK = 4500  # factorisations: a step that was given up on after more has spent its budget, as its trace would tell
 MOST_REPEATED = 30  # cases of an episode whose commands are repeated, which takes long
 SAME_PLACE = 1e-4  # of the offset and the robot's length: steps given up on there
 SAME_WAY = 0.1  # distance of unit vectors to their commands: and in this direction are one case
@@ -44,13 +45,16 @@ class Finding(NamedTuple):
 
 def check(solver, taken, tally, offset=0):
     """Return all findings of a walk, and add its measurements to the tally."""
-    findings = _rest(solver, taken) + _states(solver, taken, tally) + _optimality(solver, taken, tally, offset)
-    findings += (
-        _stalled(solver, taken)
-        + _gave_up(solver, taken, tally)
-        + _blocked(solver, taken, tally)
-        + _cores(solver, taken, tally)
-    )
+    numbers = Numbers.of(taken.states)
+    findings = [
+        *_rest(solver, taken),
+        *_states(solver, numbers, tally),
+        *_optimality(solver, taken, tally, offset),
+        *_stalled(solver, taken),
+        *_gave_up(solver, taken, tally),
+        *_blocked(solver, taken, tally),
+        *_cores(solver, taken, numbers, tally),
+    ]
     tally.findings.update(finding.kind for finding in findings)
     return findings
 
@@ -63,16 +67,16 @@ def _rest(solver, taken):
     return [] if kept else [Finding(f"at rest {rest.status.name}", 0, worst)]
 
 
-def _states(solver, taken, tally):
+def _states(solver, numbers, tally):
     """Check numbers, gaps, edges, tensions and work of every state."""
-    states, robot = taken.states, solver.robot
+    robot, work = solver.robot, numbers.work
     length = robot.longest_mm
-    finite = np.array([np.isfinite(state.block[~np.isposinf(state.block)]).all() for state in states])
-    least = np.array([state.gaps.min(initial=math.inf) for state in states]) / length
-    inside = _least_distance(solver, states) / length
-    edges = np.linalg.norm(np.diff(_points(states), axis=2), axis=-1).max(axis=2) / robot.edges_mm
-    tension = np.array([np.max(state.tensions) for state in states]) / robot.max_tension
-    work = np.array([state.factorizations for state in states])
+    finite = (np.isfinite(numbers.blocks) | np.isposinf(numbers.blocks)).all(axis=1)
+    least = numbers.gaps.min(axis=(1, 2, 3), initial=math.inf) / length
+    inside = _least_distance(solver, numbers) / length
+    edges = np.linalg.norm(np.diff(numbers.points, axis=2), axis=-1).max(axis=2) / robot.edges_mm
+    tension = numbers.tensions.max(axis=1) / robot.max_tension
+    tally.contact += int(numbers.touching[1:].sum())
     tally.least_gap = min(tally.least_gap, least.min(initial=math.inf))
     tally.least_distance = min(tally.least_distance, inside.min(initial=math.inf))
     tally.most_tension = max(tally.most_tension, tension.max())
@@ -92,25 +96,14 @@ def _first(kind, wrong, values):
     return [Finding(kind, max(int(k) - 1, 0), float(values[k])) for k in np.flatnonzero(wrong)[:1]]
 
 
-def _points(states):
-    robot = states[0].robot
-    frames = None if isinstance(robot, Robot) else np.stack([state.frames for state in states])
-    return line_points(robot, np.stack([state.nodes for state in states]), frames)
-
-
-def _displacements(states):
-    return np.stack([state.displacements for state in states])
-
-
-def _least_distance(solver, states):
+def _least_distance(solver, numbers):
     """Return the least signed distance to the obstacles that all points can touch, ``(T+1,)`` [mm]."""
-    points, moved = _points(states), _displacements(states)
     distances = [
-        distance(obstacle, points - moved[:, None, None, j]).min(axis=(1, 2))
+        distance(obstacle, numbers.points - numbers.displacements[:, None, None, j]).min(axis=(1, 2))
         for j, obstacle in enumerate(solver.scene)
         if obstacle.nodes is None
     ]
-    return np.min(distances, axis=0) if distances else np.full(len(states), math.inf)
+    return np.min(distances, axis=0) if distances else np.full(len(numbers.blocks), math.inf)
 
 
 def _optimality(solver, taken, tally, offset):
@@ -127,7 +120,7 @@ def _optimality(solver, taken, tally, offset):
         if wanted:
             certified += 1
             tally.certified += 1
-            worst = certificate(state)
+            worst = certificate(state) / _strain(state)
             tally.worst_certificate = max(tally.worst_certificate, worst)
             if not worst <= CERTIFIED:
                 findings.append(Finding("certificate", k, worst))
@@ -206,7 +199,7 @@ def _reason(solver, taken, k, repeats=REPEATS):
     each other so much that segments bend to and fro, from pattern to pattern in many small snaps.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
-    reason = _trace(solver, taken.states[k], command).reason
+    reason = "work" if state.factorizations > WORK else _trace(solver, taken.states[k], command).reason
     if reason == "folded":
         return reason
     near_zero = PRETENSION * robot.offset_mm
@@ -284,12 +277,12 @@ def _passes(solver, state, commands):
     return state.status < Status.BLOCKED
 
 
-def _cores(solver, taken, tally):
+def _cores(solver, taken, numbers, tally):
     """Check for swept cores from state to state where all moves are small, else between accepted shapes."""
     core, states = CoreCheck(solver.robot, solver.scene), taken.states
     if not core.obstacles:
         return []
-    points, moved = _points(states), _displacements(states)
+    points, moved = numbers.points, numbers.displacements
     motion = np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=(1, 2))
     motion = np.maximum(motion, np.linalg.norm(np.diff(moved, axis=0), axis=-1).max(axis=1, initial=0))
     snapped = np.array([state.status == Status.SNAPPED for state in states[1:]], bool)

@@ -49,11 +49,11 @@ class CoreCheck:
     """
 
     def __init__(self, robot, scene):
-        self.edges = robot.edges_mm
+        self.edges = np.array(robot.edges_mm)
         cored = [obstacle.nodes is None and math.isfinite(obstacle.extent.radius) for obstacle in scene]
         self.obstacles = [(j, obstacle) for j, obstacle in enumerate(scene) if cored[j]]
         self.planar = not scene.obstacles or scene.obstacles[0].space == 2
-        self._candidates = {j: _candidates(obstacle) for j, obstacle in self.obstacles} if self.planar else {}
+        self._seen_from = {j: _seen_from(obstacle, self.edges) for j, obstacle in self.obstacles} if self.planar else {}
 
     def swept(self, points, displacements, linked=True):
         """Return which obstacles' cores were swept between consecutive shapes, ``(k-1, m)`` bool.
@@ -64,23 +64,40 @@ class CoreCheck:
             linked: Which neighbouring shapes belong to the same motion, ``(k-1,)`` bool.
         """
         swept = np.zeros((len(points) - 1, displacements.shape[1]), bool)
-        for line, longest in enumerate(self.edges):
-            for j, obstacle in self.obstacles:
-                seen = points[:, line] - displacements[:, None, j]
-                close = linked & _close(obstacle, seen, longest)
-                if close.any():
-                    before, after = seen[:-1][close], seen[1:][close]
-                    swept[close, j] |= self._is_swept(j, obstacle, before, after, longest)
+        low, high = points.min(axis=2), points.max(axis=2)
+        for j, obstacle in self.obstacles:
+            moved = displacements[:, j]
+            least, most = low - moved[:, None], high - moved[:, None]
+            near = _reach(obstacle, np.minimum(least[:-1], least[1:]), np.maximum(most[:-1], most[1:]), self.edges)
+            near &= np.transpose([linked])
+            for line in np.flatnonzero(near.any(axis=0)):
+                steps = np.flatnonzero(near[:, line])
+                before, after = (points[k, line] - moved[k, None] for k in (steps, steps + 1))
+                if self.planar:
+                    swept[steps, j] |= _sweeps(before, after, self._seen_from[j][line]).any(axis=-1)
+                else:
+                    swept[steps, j] |= _deepest_patch(obstacle, before, after, self.edges[line])
         return swept
 
-    def _is_swept(self, j, obstacle, before, after, longest):
-        if not self.planar:
-            return _deepest_patch(obstacle, before, after, longest)
-        points, depths = self._candidates[j]
-        core = (depths > longest * (0.5 + SLACK)).reshape(RINGS, -1)
-        outermost = core & (np.cumsum(core, axis=0) == 1)
-        seen_from = np.unique(points[outermost.ravel()], axis=0)
-        return (windings(before, after, seen_from) != 0).any(axis=-1)
+
+def _seen_from(obstacle, edges):
+    """Return, for each line, the outermost points of an obstacle's core on some rays, a list of ``(s, 2)``."""
+    points, depths = _candidates(obstacle)
+    cores = [(depths > longest * (0.5 + SLACK)).reshape(RINGS, -1) for longest in edges]
+    outermost = [core & (np.cumsum(core, axis=0) == 1) for core in cores]
+    return [np.unique(points[chosen.ravel()], axis=0) for chosen in outermost]
+
+
+def _sweeps(before, after, points):
+    """Return the :func:`windings` of lines about points, as the sum of those of all edges, of which few come near."""
+    corners = _corners(before, after)
+    low, high = points.min(axis=0, initial=math.inf), points.max(axis=0, initial=-math.inf)
+    near = ((corners.min(axis=0) <= high) & (corners.max(axis=0) >= low)).all(axis=-1)
+    steps, edges = np.nonzero(near)
+    ends = np.column_stack([edges, edges + 1])
+    turns = np.zeros((len(before), len(points)), int)
+    np.add.at(turns, steps, windings(before[steps[:, None], ends], after[steps[:, None], ends], points))
+    return turns
 
 
 def windings(before, after, points):
@@ -105,14 +122,14 @@ def _candidates(obstacle):
     return points, depth(obstacle, points)
 
 
-def _close(obstacle, line, longest):
-    """Return whether any edge of a line ``(k, n, d)`` may have come near an obstacle, ``(k-1,)``."""
+def _reach(obstacle, low, high, longest):
+    """Return whether boxes, given by their corners ``(..., d)``, reach the ball around an obstacle's core, ``(...)``.
+
+    In a straight motion, edges stay in the box around them before and after.
+    """
     center, radius = obstacle.extent[:2]
-    offset = line - np.array(center)
-    nearest = np.sqrt((offset * offset).sum(axis=-1).min(axis=1))
-    way = np.diff(line, axis=0)
-    motion = np.sqrt((way * way).sum(axis=-1).max(axis=1))
-    return np.minimum(nearest[:-1], nearest[1:]) < radius + longest / 2 + motion
+    outside = np.maximum(np.maximum(low - np.array(center), np.array(center) - high), 0)
+    return (outside * outside).sum(axis=-1) <= np.maximum(radius - longest / 2, 0) ** 2
 
 
 def _deepest_patch(obstacle, before, after, longest):
@@ -122,14 +139,20 @@ def _deepest_patch(obstacle, before, after, longest):
     largest value.
     """
     swept = np.zeros(len(before), bool)
-    corners = np.stack([before[:, :-1], before[:, 1:], after[:, :-1], after[:, 1:]], axis=2)  # (k, n-1, 4, 3)
-    middle = corners.mean(axis=2)
-    reach = np.linalg.norm(corners - middle[:, :, None], axis=-1).max(axis=-1)
-    where = np.argwhere(distance(obstacle, middle) < reach - longest / 2)
-    if len(where):
-        deepest = _zoom(obstacle, corners[tuple(where.T)])
-        swept[where[deepest > longest * (0.5 + SLACK), 0]] = True
+    corners = _corners(before, after)
+    steps, edges = np.nonzero(_reach(obstacle, corners.min(axis=0), corners.max(axis=0), longest))
+    patches = np.moveaxis(corners[:, steps, edges], 0, 1)  # (c, 4, 3)
+    middle = patches.mean(axis=1)
+    reach = np.linalg.norm(patches - middle[:, None], axis=-1).max(axis=-1)
+    deep = distance(obstacle, middle) < reach - longest / 2
+    if deep.any():
+        swept[steps[deep][_zoom(obstacle, patches[deep]) > longest * (0.5 + SLACK)]] = True
     return swept
+
+
+def _corners(before, after):
+    """Return the corners of the patches that edges of lines ``(k, n, d)`` sweep, ``(4, k, n-1, d)``."""
+    return np.stack([before[:, :-1], before[:, 1:], after[:, :-1], after[:, 1:]])
 
 
 def _zoom(obstacle, corners):

@@ -45,12 +45,16 @@ class Tally:
         states = walk.states[1:]
         return cls(
             steps=len(states),
-            contact=sum(bool(state.contact.any()) for state in states),
             statuses=Counter(Status(state.status).name for state in states),
             kinds=Counter({setting.kind: len(states)}),
             refused=setting.refused,
             certificates_each=20 if model in SPATIAL else 1000,
         )
+
+    @classmethod
+    def load(cls, entries):
+        """Return the tally of its attributes as stored in JSON."""
+        return cls(**{name: Counter(entry) if isinstance(entry, dict) else entry for name, entry in entries.items()})
 
     def add(self, other):
         """Add another tally to this one."""

@@ -35,7 +35,7 @@ def scale_robot(robot, s):
     lengths = {
         "length_mm": s * robot.length_mm,
         "offset_mm": s * robot.offset_mm,
-        "max_cable_mm": s * robot.max_cable_mm,
+        "max_cable_mm": s * robot.cable_limit_mm,
     }
     if isinstance(robot, Robot):
         lengths |= {"length_range_mm": times(robot.length_range_mm, s)}

@@ -4,10 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from soak.cores import line_points
 from soak.drives import drives_of
-from solver import Robot
+from solver import Robot, Status
 
 SIGNED = 0.8  # share of the moves of several cables that are signed commands
+IN_VAIN = 10  # steps given up on in a row after which a walk ends: it would go on so, from a robot folded over
 
 
 class Walk(NamedTuple):
@@ -17,10 +19,48 @@ class Walk(NamedTuple):
     commands: np.ndarray  # (T, cables + 1) [mm], the length last
 
 
+class Numbers(NamedTuple):
+    """Numbers of the states of a walk, read from all of their blocks at once.
+
+    Attributes:
+        blocks: The blocks, ``(k, size)``.
+        work: Factorisations, ``(k,)``.
+        gaps: Gaps, ``(k, m, p, positions)`` [mm].
+        touching: Whether any point touches an obstacle, ``(k,)`` bool.
+        tensions: Tensions of the cables, ``(k, c)`` [N].
+        points: The points that can touch, ``(k, p, positions, d)`` [mm].
+        displacements: Displacements of the obstacles, ``(k, m, d)`` [mm].
+    """
+
+    blocks: np.ndarray
+    work: np.ndarray
+    gaps: np.ndarray
+    touching: np.ndarray
+    tensions: np.ndarray
+    points: np.ndarray
+    displacements: np.ndarray
+
+    @classmethod
+    def of(cls, states):
+        """Return the numbers of states of one robot and scene."""
+        robot, layout = states[0].robot, states[0]._layout
+        blocks = np.stack([state.block for state in states])
+        frames = None if isinstance(robot, Robot) else layout.frames(blocks)
+        return cls(
+            blocks=blocks,
+            work=np.array([state.factorizations for state in states]),
+            gaps=layout.gaps(blocks),
+            touching=(layout.multipliers(blocks) > 0).any(axis=(1, 2, 3)),
+            tensions=layout.tensions(blocks),
+            points=line_points(robot, layout.nodes(blocks), frames),
+            displacements=layout.displacements(blocks),
+        )
+
+
 def walk(solver, increments):
     """Walk by increments on what the robot has reached, clipped to its range.
 
-    Each is a pair of a drive and a move of its inputs, the length last.
+    Each is a pair of a drive and a move of its inputs, the length last. A walk that gets nowhere ends early.
     """
     states, commands = [solver.rest()], []
     for drive, increment in increments:
@@ -28,6 +68,8 @@ def walk(solver, increments):
         command = np.append(drive.pulls(reached[:-1], increment[:-1]), reached[-1] + increment[-1])
         commands.append(_in_range(solver.robot, command))
         states.append(step(solver, states[-1], commands[-1]))
+        if all(state.status == Status.GAVE_UP for state in states[-IN_VAIN:]):
+            break
     return Walk(states, np.reshape(commands, (-1, len(solver.robot.cables) + 1)))
 
 

@@ -196,3 +196,27 @@ def test_limits_are_those_of_each_robot():
     assert batch.leaves_clear(Scene([Circle(center=(0.0, 190.0), radius=9.0)]))
     longer = replace(KINDS["rod"], length_mm=185.0)
     assert not batch.leaves_clear(Scene([Circle(center=(0.0, 190.0), radius=9.0)]), longer)
+
+
+@pytest.mark.parametrize("kind", ["rod", "rod in space"])
+def test_robots_that_are_assigned_alike_move_alike(kind):
+    robots, scenes, pulls = family(kind, 8)
+    first = batch_of(kind, robots, scenes, 1)
+    second = type(first)(KINDS[kind], 8, 1)
+    for _ in range(2):  # the second time only scenes change
+        for index in range(8):
+            second.assign_alike(index, first)
+        second.rest(range(8))
+        for row in pulls:
+            commands = row[:, 0] if first.cables == 1 else row
+            first.step(commands)
+            second.step(commands)
+        assert np.array_equal(first.blocks, second.blocks)
+        assert [second.robot_of(k) for k in range(8)] == [first.robot_of(k) for k in range(8)]
+        assert [second.scene(k) for k in range(8)] == scenes
+        scenes = [scene_for(KINDS[kind], np.random.default_rng(k)) for k in range(8)]
+        for index, (robot, scene) in enumerate(zip(robots, scenes, strict=True)):
+            first.assign(index, scene, robot)
+        first.rest(range(8))
+    with pytest.raises(ValueError, match="robot 0 has no scene"):
+        second.assign_alike(0, type(first)(KINDS[kind], 8, 1))

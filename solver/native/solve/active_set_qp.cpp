@@ -301,7 +301,6 @@ bool ActiveSetQp<Model>::balance(const ContactProblem& problem, KktSystem& kkt, 
   for (int j = 0; j < active.count; ++j) change[j] = -along(j, step);
   solve_gram(active.count, change);
   apply(change, active, step);
-  for (int j = 0; j < active.count; ++j) active.multiplier[j] = std::max(0.0, active.multiplier[j]);
   return true;
 }
 

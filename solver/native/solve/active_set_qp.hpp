@@ -39,7 +39,7 @@ class ActiveSetQp {
 
   // Finds the step and the multipliers that balance the gradient while the active gaps stay as they are. Leaves out of
   // `active` the gaps whose slopes depend on those before; they keep the multipliers that the gradient
-  // contains. False where H is not positive definite on the tangent space. No multiplier becomes negative.
+  // contains. False where H is not positive definite on the tangent space. Multipliers may become negative.
   bool balance(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
   // Where the last solve or restoration found that the linearised gaps have no common solution: those gaps, the last

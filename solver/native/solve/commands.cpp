@@ -32,10 +32,16 @@ double ModelContinuation<Model>::pull(const Command& command, int cable) const {
   return Model::kRod ? command.cables[cable] : std::abs(command.cables[cable]);
 }
 
+// Whether a command pulls a cable in, by more than the rounding of a displacement that is to stay.
+template <class Model>
+bool ModelContinuation<Model>::pulls_in(const Command& command, int cable) const {
+  return pull(command, cable) > pull(present_.command, cable) + kCommandResolution * problem_.robot().offset;
+}
+
 template <class Model>
 bool ModelContinuation<Model>::pulls_cable(const Command& command) const {
   for (int k = 0; k < kCables; ++k)
-    if (pull(command, k) > pull(present_.command, k)) return true;
+    if (pulls_in(command, k)) return true;
   return false;
 }
 
@@ -48,6 +54,7 @@ bool ModelContinuation<Model>::only_releases(const Command& command) const {
 #define CCR_INSTANTIATE(Model)                                                            \
   template double ModelContinuation<Model>::travel(const Command&, const Command&) const; \
   template double ModelContinuation<Model>::pull(const Command&, int) const;              \
+  template bool ModelContinuation<Model>::pulls_in(const Command&, int) const;            \
   template bool ModelContinuation<Model>::pulls_cable(const Command&) const;              \
   template bool ModelContinuation<Model>::only_releases(const Command&) const;            \
   template double ModelContinuation<Model>::command_distance(const Command&, const Command&) const;

@@ -154,6 +154,7 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
     }
     Command goal = raise_to_pretension(pursuit.wanted);
     if (moves_obstacles(goal)) share_motion(goal, pursuit.holds);
+    if (highest(tensions_) > limit) wait_for_motors(goal);
     const double remaining = command_distance(present_.command, goal);
     if (remaining == 0 && resume(pursuit)) continue;
     if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;
@@ -172,6 +173,15 @@ bool ModelContinuation<Model>::resume(Pursuit& pursuit) const {
   pursuit.resumed = here;
   pursuit.was_resumed = true;
   return true;
+}
+
+// Whether a gap closed from `present_` to `trial_`, before which the tension may have fallen though it rises now.
+template <class Model>
+bool ModelContinuation<Model>::gap_closed() const {
+  const ActiveSet &before = present_.active, &now = trial_.active;
+  const auto begin = before.contact.begin(), end = begin + before.count;
+  return std::any_of(now.contact.begin(), now.contact.begin() + now.count,
+                     [&](int contact) { return std::find(begin, end, contact) == end; });
 }
 
 // One sub-step towards a command at a distance; false at the end of the pursuit.
@@ -193,15 +203,19 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     pursuit.refined = false;
     if (size >= kSmallestStep) pursuit.finest = kSmallestStep;
   } else if (move == Move::kOverTension) {
-    stalled = stalled || approach_tension_limit();
-    step = size / 2;
+    const bool may_fall = !stalled && size > kPeakStep && is_at_tension_limit() && gap_closed();
+    stalled = stalled || (!may_fall && approach_tension_limit());
+    step = may_fall ? kPeakStep : size / 2;
   } else if (size > pursuit.finest || (size > kTightStep && is_tight() && !is_blocked(next))) {
     step = size / 2;
     pursuit.refined = true;
   } else if (const Conflict conflict = meet_conflict(next); conflict == Conflict::kTight) {
     stalled = true;
   } else {
-    const End end = descend_from_end(next);
+    // Cables that no limit stops buckle the robot, farther than roundoff in its energy hides.
+    const bool buckles = conflict == Conflict::kBlocked && size < kPatientStep;
+    const double part = buckles ? std::min(1.0, kPatientStep / remaining) : 0.0;
+    const End end = descend_from_end(buckles ? between(present_.command, goal, part) : next);
     if (end == End::kStuck) {
       const bool stopped = conflict == Conflict::kBlocked || is_blocked(next);
       return refine(pursuit, size, stopped || (moves_obstacles(next) && result_.reason == Reason::kStuck));
@@ -213,7 +227,7 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   }
   if (!stalled) return true;
   pursuit.reached = std::max(pursuit.reached, Status::kStalled);
-  if (!hold_stalled_cables(pursuit.wanted)) return false;
+  if (!hold_stalled_cables(pursuit.wanted) && !resume(pursuit)) return false;
   clear_trend();
   return true;
 }
@@ -234,11 +248,13 @@ bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, d
 }
 
 // A branch that ends within a sub-step from where no descent leads on may go on in finer ones, as where neighbouring
-// contacts wedge the robot and its tension rises steeply. False where it is blocked, folds over, or goes on in none.
+// contacts wedge the robot and its tension rises steeply. False where it is blocked, folds over, or goes on in none:
+// where it has risen beyond what any motion needs, the robot is blocked.
 template <class Model>
 bool ModelContinuation<Model>::refine(Pursuit& pursuit, double size, bool blocked) {
   if (blocked || result_.reason != Reason::kStuck || pursuit.finest <= kTightStep) {
-    pursuit.reached = blocked ? Status::kBlocked : Status::kGaveUp;
+    const bool seized = result_.reason == Reason::kStuck && std::isinf(problem_.robot().max_tension) && is_tight();
+    pursuit.reached = blocked || seized ? Status::kBlocked : Status::kGaveUp;
     return false;
   }
   pursuit.finest = std::max(pursuit.finest * kRefining, kTightStep);

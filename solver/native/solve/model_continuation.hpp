@@ -75,6 +75,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Status pursue(const Command& target);
   bool resume(Pursuit& pursuit) const;
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
+  bool gap_closed() const;
   bool give_way(Pursuit& pursuit, const Command& next, double size);
   bool refine(Pursuit& pursuit, double size, bool blocked);
   Command raise_to_pretension(Command wanted) const;
@@ -93,6 +94,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   double pull(const Command& command, int cable) const;
   double command_distance(const Command& a, const Command& b) const;
   double travel(const Command& from, const Command& to) const;
+  bool pulls_in(const Command& command, int cable) const;
   bool pulls_cable(const Command& command) const;
   bool only_releases(const Command& command) const;
   bool moves_obstacles(const Command& command) const { return command.scene != present_.command.scene; }
@@ -132,6 +134,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool pay_out(const Command& command);
   bool hold_stalled_cables(Command& wanted) const;
   bool yield_cables(Command& wanted, double least) const;
+  void wait_for_motors(Command& goal) const;
   bool is_unyielding() const;
   bool is_blocked(const Command& command);
   bool find_holding_set(const Command& command, ActiveSet& holding);

@@ -235,7 +235,7 @@ bool Newton<Model>::settle(Iterate& at) {
     advance(at, 1, step_, at);
     for (int j = 0; j < others.count; ++j)
       for (int k = 0; k < at.active.count; ++k)
-        if (at.active.contact[k] == others.contact[j]) at.active.multiplier[k] = others.multiplier[j];
+        if (at.active.contact[k] == others.contact[j]) at.active.multiplier[k] = std::max(0.0, others.multiplier[j]);
   }
   return false;
 }
@@ -246,7 +246,7 @@ bool Newton<Model>::set_metric(const Iterate& at) {
   stretch_ = kStretch;
   creeping_ = false;
   lowest_ = HUGE_VAL;
-  flat_ = dropped_ = 0;
+  flat_ = fruitless_ = dropped_ = 0;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
   return factor_convexified(at.active, kDescentPenalties) && factor_metric();
@@ -296,6 +296,7 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
   result.converged = stationary && factor_stable(at.active, kPenalties);
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
   const bool flat = is_flat(at.active);
+  if (fruitless_ > kFruitless) return result;
   if (stationary || (flat && damping_ > 0)) {
     result.moved = leave_saddle(at, largest);
     if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;

@@ -74,7 +74,8 @@ class Newton {
   ActiveSet closed_contacts(const ActiveSet& active) const;
   bool gaps_closed(const ActiveSet& active, double tolerance) const;
   void choose_test();
-  bool release_lowest(Iterate& at, ActiveSet& target);
+  bool release_lowest(const Iterate& at, ActiveSet& target);
+  bool slide_along(const ActiveSet& active, ActiveSet& target);
   bool factor_penalized(const ActiveSet& active, int penalties);
   bool factor_stable(const ActiveSet& active, int penalties);
   bool factor_convexified(const ActiveSet& active, int penalties);
@@ -101,7 +102,8 @@ class Newton {
   double stretch_ = 1;         // of the next damped iterate of this descent
   bool creeping_ = false;      // whether the iterates of this descent hardly move
   double lowest_ = 0;          // energy of this descent when it fell last
-  int flat_ = 0;               // iterates since then
+  int fruitless_ = 0;          // iterates since then,
+  int flat_ = 0;               // and since a saddle was suspected
   int dropped_ = 0;            // iterates that would not be stable without a gap that they drop
 };
 

@@ -36,9 +36,10 @@ template <class Model>
 bool Newton<Model>::is_flat(const ActiveSet& active) {
   if (problem.energy() < lowest_ - rise_of_roundoff(active)) {
     lowest_ = problem.energy();
-    flat_ = 0;
+    flat_ = fruitless_ = 0;
   } else {
     ++flat_;
+    ++fruitless_;
   }
   return flat_ >= kFlat;
 }
@@ -83,18 +84,34 @@ bool Newton<Model>::leave_saddle(Iterate& at, double largest) {
   return false;
 }
 
-// Solves for the step without the active gap that is pressed least, with only the damping that its absence needs.
+// Solves for the step without the active gap that is pressed least, with only the damping that its absence needs; where
+// that gap stays closed nevertheless, for the step along it.
 template <class Model>
-bool Newton<Model>::release_lowest(Iterate& at, ActiveSet& target) {
+bool Newton<Model>::release_lowest(const Iterate& at, ActiveSet& target) {
   target = at.active;
   if (target.count == 0) return false;
   const auto begin = target.multiplier.begin();
-  target.drop(static_cast<int>(std::min_element(begin, begin + target.count) - begin));
+  const int lowest = static_cast<int>(std::min_element(begin, begin + target.count) - begin);
+  const int contact = target.contact[lowest];
+  target.drop(lowest);
   problem.reduced_gradient(target);
   needed_damping_ = 0;
   const bool solved = factor_convexified(target, kDescentPenalties) && qp_.solve(problem, kkt_, target, step_);
-  if (!solved) problem.reduced_gradient(at.active);
-  return solved;
+  const auto end = target.contact.begin() + target.count;
+  if (solved && std::find(target.contact.begin(), end, contact) == end) return true;
+  problem.reduced_gradient(at.active);
+  return solved && slide_along(at.active, target);
+}
+
+// Solves for the step that keeps active gaps as they are, and drops those that would pull the robot at its end.
+template <class Model>
+bool Newton<Model>::slide_along(const ActiveSet& active, ActiveSet& target) {
+  target = active;
+  needed_damping_ = 0;
+  if (!factor_convexified(target, kDescentPenalties) || !qp_.balance(problem, kkt_, target, step_)) return false;
+  for (int j = target.count - 1; j >= 0; --j)
+    if (target.multiplier[j] <= 0) target.drop(j);
+  return true;
 }
 
 #define CCR_INSTANTIATE(Model)                                                  \
@@ -104,7 +121,8 @@ bool Newton<Model>::release_lowest(Iterate& at, ActiveSet& target) {
   template bool Newton<Model>::find_softest(const ActiveSet&);                  \
   template bool Newton<Model>::bend_softly(Iterate&, const ActiveSet&, double); \
   template bool Newton<Model>::leave_saddle(Iterate&, double);                  \
-  template bool Newton<Model>::release_lowest(Iterate&, ActiveSet&);
+  template bool Newton<Model>::release_lowest(const Iterate&, ActiveSet&);      \
+  template bool Newton<Model>::slide_along(const ActiveSet&, ActiveSet&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

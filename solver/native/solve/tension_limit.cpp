@@ -29,7 +29,8 @@ void ModelContinuation<Model>::keep_last_held(const Iterate& held) {
 
 // `present_` is below the tension limit, `trial_` above: closes in from below by false position (Illinois), aiming into
 // the middle of the accepted band, with the cables that `trial_` takes beyond the limit: others may be held at it
-// already. False where the branch cannot be followed that far.
+// already. False where the branch cannot be followed that far, unless the tension jumps over the limit within the
+// smallest sub-step, as it may where other cables of a robot that is held tight become taut.
 template <class Model>
 bool ModelContinuation<Model>::approach_tension_limit() {
   const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
@@ -51,7 +52,7 @@ bool ModelContinuation<Model>::approach_tension_limit() {
     const double middle =
         std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
     const Move move = try_command(between(start, end, middle));
-    if (move == Move::kRejected) return false;
+    if (move == Move::kRejected) return width * span <= kSmallestStep;
     if (move == Move::kAccepted) {
       accept();
       low = middle;
@@ -76,7 +77,7 @@ bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
   const auto give_up = [&](double tension) {
     bool held = false;
     for (int k = 0; k < kCables; ++k) {
-      if (tensions_[k] < tension || pull(wanted, k) <= pull(present_.command, k)) continue;
+      if (tensions_[k] < tension || !pulls_in(wanted, k)) continue;
       wanted.cables[k] = present_.command.cables[k];
       held = true;
     }
@@ -100,6 +101,13 @@ bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const
     changed = true;
   }
   return changed;
+}
+
+// Keeps other cables from being pulled in while motors yield.
+template <class Model>
+void ModelContinuation<Model>::wait_for_motors(Command& goal) const {
+  for (int k = 0; k < kCables; ++k)
+    if (pull(goal, k) > pull(present_.command, k)) goal.cables[k] = present_.command.cables[k];
 }
 
 // Whether a cable that its motor cannot hold has nothing more to let out.
@@ -164,6 +172,7 @@ bool ModelContinuation<Model>::is_blocked(const Command& command) {
   template bool ModelContinuation<Model>::approach_tension_limit();             \
   template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;  \
   template bool ModelContinuation<Model>::yield_cables(Command&, double) const; \
+  template void ModelContinuation<Model>::wait_for_motors(Command&) const;      \
   template bool ModelContinuation<Model>::is_unyielding() const;                \
   template bool ModelContinuation<Model>::is_blocked(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)

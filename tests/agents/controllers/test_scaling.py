@@ -14,7 +14,7 @@ from solver.spatial import SpatialRobot
 def scaled(robot, s):
     """Return a robot s times as large, with s² times its rigidity: it moves alike under the same forces."""
     cables = tuple(replace(cable, offset_mm=cable.offset_mm and s * cable.offset_mm) for cable in robot.cables)
-    sizes = {name: s * getattr(robot, name) for name in ("length_mm", "offset_mm", "max_cable_mm")}
+    sizes = {name: s * getattr(robot, name) for name in ("length_mm", "offset_mm")}
     return replace(robot, cables=cables, rigidity=s**2 * robot.rigidity, **sizes)
 
 

@@ -2,7 +2,6 @@
 
 import copy
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,7 +83,7 @@ def test_arrays_pass_through_text():
     text = json.dumps({"blocks": rows.blocks.tolist(), "commands": rows.commands.tolist()})
     read = {name: np.array(values) for name, values in json.loads(text).items()}
     other = make_batch(rested=False)
-    other.set_rows([1], replace(rows, **read))
+    other.set_rows([1], rows._replace(**read))
     for each in (batch, other):
         each.step(np.array([9.0]), [1])
     assert np.array_equal(other.blocks[1], batch.blocks[1])
@@ -102,7 +101,7 @@ def test_arrays_pass_through_text():
 )
 def test_rows_that_do_not_fit_are_refused(changed, message):
     batch = make_batch()
-    rows, before = replace(batch.get_rows([0]), **changed), batch.get_rows([0, 1, 2])
+    rows, before = batch.get_rows([0])._replace(**changed), batch.get_rows([0, 1, 2])
     with pytest.raises(ValueError, match=message):
         batch.set_rows([0], rows)
     after = batch.get_rows([0, 1, 2])

@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import (
-    Circle,
-    Robot,
-)
+from solver import Cable, Circle, Robot, Scene, Solver
 
 PROTOTYPE = {"length_mm": 180.0, "segments": 18, "offset_mm": 8.0}
 
@@ -66,3 +63,23 @@ def test_numbers_of_numpy_are_numbers():
     assert {type(value) for value in (given.length_mm, given.offset_mm)} == {float}
     assert {type(value) for value in (given.segments, given.between)} == {int}
     assert Circle(center=np.array([40, 100]), radius=np.int64(10)) == Circle(center=(40.0, 100.0), radius=10.0)
+
+
+@pytest.mark.parametrize("robot", [Robot.prototype(), Robot.prototype(model="paper"), Robot.preset("rao_2021")])
+def test_limits_that_are_not_given_follow_changed_sizes(robot):
+    smaller = replace(robot, offset_mm=0.5, cables=() if robot.model == "paper" else robot.cables[:1])
+    assert smaller.cable_limit_mm == pytest.approx(0.5 * math.pi)
+    assert replace(robot, max_cable_mm=4.0).cable_limit_mm == 4.0
+    assert replace(replace(robot, max_cable_mm=4.0), max_cable_mm=None) == robot
+
+
+@pytest.mark.parametrize("cables", [(Cable(),), (Cable(), Cable(angle=math.pi))])
+def test_loads_that_a_single_cable_cannot_hold_are_refused(cables):
+    loaded = Robot.prototype(cables=cables, weight_per_length=(-0.0025, 0.0), max_tension=1.0)
+    if len(cables) == 2:
+        assert Solver(loaded, Scene()).rest().tensions.max() <= 1  # the motors pay them out
+        return
+    with pytest.raises(ValueError, match=r"max_tension is 1 N; at rest the loads .* raise max_tension"):
+        Solver(loaded, Scene())
+    held = Solver(replace(loaded, max_tension=15.0), Scene()).rest()
+    assert 1 < held.tensions[0] < 15

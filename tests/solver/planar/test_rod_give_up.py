@@ -1,13 +1,14 @@
 """Steps of rods with several cables that used to be given up on, though the robot stalls or has somewhere to go."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from soak.episodes import Episode, setting_of
 from soak.walks import sample_increments, walk
 
-from solver import Cable, Robot, Scene, Solver, Status
+from solver import Cable, Circle, Robot, Scene, Solver, Status
 
 PAIR = (Cable(), Cable(angle=math.pi))
 SMALL = Robot(length_mm=18.0, segments=9, offset_mm=0.8, rigidity=50.0, max_tension=15.0, between=1, cables=PAIR)
@@ -27,8 +28,39 @@ STRONG = Robot.prototype(model="rod", segments=9, cables=PAIR, max_tension=100.0
 BUCKLING = 6 * STRONG.rigidity * (STRONG.segments / STRONG.length_mm) ** 2  # of each of two cables [N]
 
 
-def follow(robot, *commands):
-    solver = Solver(robot, Scene([]))
+UNEVEN = replace(STRONG, max_tension=math.inf, cables=(Cable(offset_mm=4.43), Cable(offset_mm=7.44, angle=math.pi)))
+CHANNEL = tuple(
+    Circle(center=center, radius=13.29118997752611)
+    for center in (
+        (-22.402248937491407, 130.69976233774014),
+        (-22.402248937491407, 164.81039191379023),
+        (22.440423416647292, 75.76969316316612),
+        (22.440423416647292, 109.8803227392162),
+        (22.440423416647292, 178.10158189131633),
+    )
+)
+INSERTED = replace(STRONG, segments=30, between=3, touch=("backbone", "cable", "rim"), length_range_mm=(100.0, 180.0))
+MEETS_A_PEG = replace(
+    INSERTED,
+    length_mm=145.007020686826,
+    cables=(Cable(offset_mm=6.207458811814818, end=26), Cable(angle=math.pi)),
+)
+SNAPS_AT_THE_LIMIT = replace(
+    INSERTED,
+    length_mm=13.250823112489886,
+    length_range_mm=(10.0, 18.0),
+    segments=18,
+    offset_mm=0.8,
+    disk_radius_mm=0.8,
+    rigidity=50.0,
+    max_tension=15.0,
+    max_cable_mm=2.5,
+    cables=(Cable(offset_mm=0.7497871118287467, end=13), Cable()),
+)
+
+
+def follow(robot, *commands, scene=()):
+    solver = Solver(robot, Scene(scene))
     states = [solver.rest()]
     for command in commands:
         states.append(solver.step(states[-1], *command))
@@ -71,3 +103,49 @@ def test_a_descent_does_not_creep_along_a_contact_that_it_must_leave():
     increments = sample_increments(generator, setting.solver, setting.scale, 500)
     states = walk(setting.solver, increments[:316]).states
     assert max(state.status for state in states) < Status.GAVE_UP
+
+
+@pytest.mark.parametrize("start", [(-0.404340139, -0.595947961), (-1.0, -1.0), (-0.4, -0.6)])
+@pytest.mark.parametrize("command", [(0.0118121596, 0.01740968), (0.01, 0.015), (0.01, 0.02)])
+def test_cables_that_are_pulled_from_slack_buckle_the_robot_however_little(start, command):
+    """All patterns of bends have almost the same energy there; moments of two cables that pull evenly balance."""
+    *_, buckled = follow(UNEVEN, (start,), (command,))
+    assert buckled.status is Status.SNAPPED
+    assert buckled.cables_mm == pytest.approx(command, abs=1e-9)
+    assert buckled.tensions.sum() == pytest.approx(2 * BUCKLING, rel=1e-3)
+    assert buckled.tensions[0] * 4.43 == pytest.approx(buckled.tensions[1] * 7.44, rel=1e-3)
+
+
+def test_a_descent_slides_along_a_contact_that_presses_it_less_and_less():
+    start, command = (1.4277523630782247, -2.8555047261564495), (8.484631712714396, -16.969263425428792)
+    *_, snapped = follow(replace(STRONG, segments=30, between=0), (start,), (command,), scene=CHANNEL)
+    assert snapped.status is Status.SNAPPED
+    assert snapped.cables_mm == pytest.approx(command, abs=1e-9)
+    assert snapped.residuals().stationarity * STRONG.length_mm < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("robot", "peg", "commands"),
+    [
+        (
+            MEETS_A_PEG,
+            Circle(center=(16.40493356487175, 109.54219081832039), radius=2.201040247722756),
+            (
+                ((1.1589543941713178, 7.982880028435452), 112.94782816926005),
+                ((3.041023189381013, 10.718497609342563), 111.65652321107821),
+            ),
+        ),
+        (
+            SNAPS_AT_THE_LIMIT,
+            Circle(center=(2.510856434939581, 12.106145683892619), radius=0.47958951537226735),
+            (((0.003979781339305894, 1.2016331899014785), 15.868367893898117),),
+        ),
+    ],
+    ids=["the tension falls before the robot meets a peg", "a stalled cable is let go by another"],
+)
+def test_a_stall_is_where_a_repeated_command_leads_no_farther(robot, peg, commands):
+    *_, stalled, again = follow(robot, *commands, commands[-1], scene=(peg,))
+    assert stalled.status is again.status is Status.STALLED
+    assert stalled.tensions.max() == pytest.approx(robot.max_tension, rel=1.1e-6)
+    assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-4 * robot.offset_mm)
+    assert again.length_mm == pytest.approx(stalled.length_mm, abs=1e-4 * robot.length_mm)

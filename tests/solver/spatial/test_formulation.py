@@ -143,3 +143,9 @@ def test_outline(obstacle):
     assert gaps.min() > -1e-9 or obstacle.kind in ("cylinder", "box")
     edge = getattr(obstacle, "edge", 0.0)
     assert gaps.max() <= edge * (math.sqrt(3) - 1) + 1e-9
+
+
+def test_the_outline_of_a_wall_grows_with_its_distance():
+    corners = {s: HalfSpace(point=(30.0 * s, 0.0, 40.0 * s), normal=(-1, 0, 0)).outline() for s in (1.0, 4.0)}
+    assert np.ptp(corners[1.0], axis=(0, 1)) == pytest.approx([0, 100, 100])
+    assert corners[4.0] == pytest.approx(4 * corners[1.0])

@@ -1,6 +1,7 @@
 """Cables of the rod in space that pull against each other."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,3 +75,31 @@ def test_a_gap_out_of_reach_among_those_that_conflict_is_not_followed():
     increments = sample_increments(generator, setting.solver, setting.scale, 500)
     states = walk(setting.solver, increments[:16]).states
     assert max(state.status for state in states) < Status.GAVE_UP
+
+
+def test_a_robot_stalls_where_the_tension_jumps_over_the_limit():
+    """Cables that hold a robot tight leave it no way; where others become taut, tensions change without a motion."""
+    angles = 5.662756963532212, 1.9606877533948088, 4.734160137367538, 3.3922960372330353, 1.1103390078608542
+    robot = SpatialRobot.prototype(
+        model="rod",
+        max_tension=100.0,
+        cables=tuple(Cable(angle=angle) for angle in (*angles, 0.7586073201773602)),
+        torsion_ratio=0.9497161784381833,
+        precurvature=(-0.0690788573108327, 0.08236914456097777, -0.07823735923544457),
+        weight_per_length=(-5.103689445903943e-05, -0.00012408300467337387, -5.169735874797899e-05),
+    )
+    start = 1.70554835364947, -1.3189854078846355, 0.8323239569614271, -1.2790937597617007
+    start += -0.038388482335240025, 0.5570297109661813
+    command = -5.406554466591348, 7.3596201982790275, -7.426446198236546, -0.5197058122344402
+    command += 6.024511040758811, 4.103792845397489
+    solver, stronger = (SpatialSolver(replace(robot, max_tension=limit), Scene()) for limit in (100.0, 130.0))
+    stalled = solver.step(solver.step(solver.rest(), start), command)
+    again = solver.step(stalled, command)
+    assert stalled.status is again.status is Status.STALLED
+    assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-6)
+    assert stalled.tensions.max() == pytest.approx(98.373, abs=1e-3)
+    farther = stalled.cables_mm + 1e-4 * (np.array(command) - stalled.cables_mm)
+    on = stronger.step(stronger.step(stronger.rest(), start), farther)
+    assert on.cables_mm == pytest.approx(farther, abs=1e-9)
+    assert on.nodes == pytest.approx(stalled.nodes, abs=2e-3)
+    assert on.tensions.max() == pytest.approx(106.763, abs=1e-3)

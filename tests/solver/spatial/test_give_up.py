@@ -1,0 +1,61 @@
+"""Steps in space that used to be given up on, though the robot stalls or is blocked."""
+
+import math
+
+import numpy as np
+import pytest
+
+from solver import Cable, Load, Scene, Status
+from solver.spatial import SpatialRobot, SpatialSolver, Sphere
+
+
+def test_a_descent_that_loses_no_energy_leaves_a_wedged_robot_the_work_to_reach_its_tension_limit():
+    """A segment caught between two spheres: the tension rises from 8 N to the limit within a micrometre."""
+    robot = SpatialRobot.prototype(model="paper", segments=9, between=1)
+    scene = Scene(
+        [
+            Sphere(center=(0.4980184451862861, -21.782172176641982, 103.13490804603079), radius=7.412391034398317),
+            Sphere(center=(6.369342656127135, -39.23245352276464, 106.52391698418005), radius=8.130649013725897),
+            Sphere(center=(-30.32368632200174, -22.249220305267425, 126.56065625842108), radius=7.539549173073781),
+        ]
+    )
+    solver = SpatialSolver(robot, scene)
+    state = solver.rest()
+    for command in (
+        (8.08782539161514, -12.566370614359172),
+        (-11.915122168526647, 3.6035652771738294),
+        (-7.623056093213194, 7.478140311929766),
+        (-8.148664837969664, 7.4336744889432245),
+    ):
+        state = solver.step(state, command)
+    assert state.status is Status.STALLED
+    assert state.tensions.max() == pytest.approx(15, rel=1e-6)
+    residuals = state.residuals()
+    assert max(residuals.stationarity * robot.length_mm, residuals.gaps / robot.length_mm) < 1e-8
+
+
+def test_a_robot_that_no_limit_stops_is_blocked_where_it_coils_until_its_disks_meet():
+    """Three cables against each other shorten no farther then, whichever way they come there: tensions diverge."""
+    robot = SpatialRobot.prototype(
+        model="rod",
+        between=1,
+        max_tension=math.inf,
+        cables=tuple(Cable(angle=2 * math.pi / 3 * k) for k in range(5)),
+        torsion_ratio=1.397238486614305,
+        weight_per_length=(0.0003808162493369544, 0.00014878843102599505, -0.0003523383980018961),
+        loads=(
+            Load(node=14, force=(0.46370010161141134, -0.003472481050994568, -0.511779038743751), at=(8.0, math.pi)),
+            Load(node=16, force=(-0.32800783404787004, -0.06721742449341554, 0.12128437122452557), at=(8.0, math.pi)),
+        ),
+    )
+    solver = SpatialSolver(robot, Scene())
+    command = np.array([-4.945410174826705, 24.175891918386796, 3.03096270242304, 13.502329984241134, -14.6])
+    at_once = solver.step(solver.rest(), command)
+    slowly = solver.rest()
+    for part in np.linspace(0, 1, 41)[1:]:
+        slowly = solver.step(slowly, part * command)
+    for state in (at_once, slowly):
+        assert state.status is Status.BLOCKED
+        assert state.cables_mm[1] / command[1] == pytest.approx(0.846884, abs=1e-5)
+        assert state.tensions.max() > 1000
+        assert max(solver.optimality(state)) < 1e-7
