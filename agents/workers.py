@@ -27,7 +27,7 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")  # read when the libraries are loaded, in new processes
     context = multiprocessing.get_context("spawn")  # torch does not survive a fork
     others = multiprocessing.active_children()
-    pool = ProcessPoolExecutor(count, mp_context=context)
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_end_with_parent)
     try:
         _start(pool, count)
         yield pool
