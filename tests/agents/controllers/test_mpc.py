@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from agents.benchmark.evaluate import run_episodes, scores
+from agents.benchmark.statistics import iqm
 from agents.controllers.force import ForceController
 from agents.controllers.harmonic import HarmonicController
 from agents.controllers.mpc import PredictiveController, plan
@@ -27,13 +28,15 @@ def test_effort_makes_it_gentler():
     assert 0 < gentle < eager
 
 
-@pytest.mark.parametrize("env_id", sorted(env_id for env_id in ENV_IDS if "Paper" not in env_id))
-def test_it_regulates_with_realistic_sensing(env_id):
-    kwargs = {"sensing": "realistic", "split": "train"}
-    planned, integral = (
-        scores(policy, env_id, 50, 8, **kwargs) for policy in (PredictiveController(), ForceController.tuned(env_id))
-    )
-    assert np.median(planned / integral) < 1  # scene by scene; both are told the same force
+def test_it_regulates_with_realistic_sensing():
+    """It errs less than PI, which is told the same force: by far on some environments, hardly where noise decides."""
+    kwargs, ratios = {"sensing": "realistic", "split": "train"}, []
+    for env_id in sorted(env_id for env_id in ENV_IDS if "Paper" not in env_id):
+        policies = PredictiveController(), ForceController.tuned(env_id)
+        planned, integral = (iqm(scores(policy, env_id, 50, 8, **kwargs)) for policy in policies)
+        ratios.append(float(planned / integral))
+    assert max(ratios) < 1.3, ratios
+    assert np.exp(np.mean(np.log(ratios))) < 0.9, ratios
 
 
 def test_it_forgets_the_episode_before():
@@ -55,7 +58,7 @@ def test_a_periodic_part_of_the_force_is_foreseen():
         controller._readings.append((cable, force))
         controller._steps.append(step)
     controller._step = 79
-    force, found, ahead = controller._series(1.0, 8)
+    force, found, ahead = controller._forecast(1.0, 8)
     assert force == pytest.approx(1.5 + breath(79), abs=0.05)
     assert found == pytest.approx(slope, abs=1)
     assert ahead == pytest.approx(breath(79 + np.arange(1, 9)) - breath(79), abs=0.1)
@@ -66,4 +69,6 @@ def test_noise_is_no_period():
     controller._readings.extend((1.0, 1.5 + generator.normal(0, 0.05)) for _ in range(80))
     controller._steps.extend(range(80))
     controller._step = 79
-    assert controller._series(1.0, 8) is None
+    force, _, ahead = controller._forecast(1.0, 8)
+    assert force == pytest.approx(1.5, abs=0.02)
+    assert not ahead.any()
