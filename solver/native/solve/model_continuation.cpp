@@ -184,10 +184,19 @@ bool ModelContinuation<Model>::gap_closed() const {
                      [&](int contact) { return std::find(begin, end, contact) == end; });
 }
 
+// Whether the tension, which is at its limit, rises at once where the robot is fed or drawn, so that a longer sub-step
+// could end behind a peak: the work of the base hides it.
+template <class Model>
+bool ModelContinuation<Model>::peaks_at_limit(const Command& goal, double remaining) {
+  if (!is_at_tension_limit() || goal.length == present_.command.length || moves_obstacles(goal)) return false;
+  return try_command(between(present_.command, goal, std::min(1.0, kPeakStep / remaining))) == Move::kOverTension;
+}
+
 // One sub-step towards a command at a distance; false at the end of the pursuit.
 template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
   double& step = pursuit.step;
+  if (step > kPeakStep && !pursuit.refined && peaks_at_limit(goal, remaining)) step = kPeakStep;
   bool stalled = layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) &&
                  goal.length == present_.command.length && !moves_obstacles(goal);
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
@@ -203,9 +212,9 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     pursuit.refined = false;
     if (size >= kSmallestStep) pursuit.finest = kSmallestStep;
   } else if (move == Move::kOverTension) {
-    const bool may_fall = !stalled && size > kPeakStep && is_at_tension_limit() && gap_closed();
+    const bool may_fall = !stalled && size > kSmallestStep && is_at_tension_limit() && gap_closed();
     stalled = stalled || (!may_fall && approach_tension_limit());
-    step = may_fall ? kPeakStep : size / 2;
+    step = may_fall ? std::min(size / 2, kPeakStep) : size / 2;
   } else if (size > pursuit.finest || (size > kTightStep && is_tight() && !is_blocked(next))) {
     step = size / 2;
     pursuit.refined = true;

@@ -76,6 +76,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool resume(Pursuit& pursuit) const;
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
   bool gap_closed() const;
+  bool peaks_at_limit(const Command& goal, double remaining);
   bool give_way(Pursuit& pursuit, const Command& next, double size);
   bool refine(Pursuit& pursuit, double size, bool blocked);
   Command raise_to_pretension(Command wanted) const;

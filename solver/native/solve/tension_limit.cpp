@@ -51,8 +51,10 @@ bool ModelContinuation<Model>::approach_tension_limit() {
     if (!(width * span > kCommandResolution)) break;
     const double middle =
         std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
-    const Move move = try_command(between(start, end, middle));
+    Move move = try_command(between(start, end, middle));
     if (move == Move::kRejected) return width * span <= kSmallestStep;
+    // A sub-step may be so small that no cable seems to be pulled in.
+    if (highest(trial_tensions_) > limit && highest(tensions_) <= limit) move = Move::kOverTension;
     if (move == Move::kAccepted) {
       accept();
       low = middle;
