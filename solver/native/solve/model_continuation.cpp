@@ -175,23 +175,6 @@ bool ModelContinuation<Model>::resume(Pursuit& pursuit) const {
   return true;
 }
 
-// Whether a gap closed from `present_` to `trial_`, before which the tension may have fallen though it rises now.
-template <class Model>
-bool ModelContinuation<Model>::gap_closed() const {
-  const ActiveSet &before = present_.active, &now = trial_.active;
-  const auto begin = before.contact.begin(), end = begin + before.count;
-  return std::any_of(now.contact.begin(), now.contact.begin() + now.count,
-                     [&](int contact) { return std::find(begin, end, contact) == end; });
-}
-
-// Whether the tension, which is at its limit, rises at once where the robot is fed or drawn, so that a longer sub-step
-// could end behind a peak: the work of the base hides it.
-template <class Model>
-bool ModelContinuation<Model>::peaks_at_limit(const Command& goal, double remaining) {
-  if (!is_at_tension_limit() || goal.length == present_.command.length || moves_obstacles(goal)) return false;
-  return try_command(between(present_.command, goal, std::min(1.0, kPeakStep / remaining))) == Move::kOverTension;
-}
-
 // One sub-step towards a command at a distance; false at the end of the pursuit.
 template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
