@@ -10,7 +10,7 @@ from soak.episodes import Episode, setting_of
 from soak.walks import sample_increments, walk
 
 from solver import Cable, Scene, Status
-from solver.spatial import SpatialRobot, SpatialSolver
+from solver.spatial import SpatialRobot, SpatialSolver, Sphere
 
 
 @pytest.mark.parametrize("count", [3, 4, 6])
@@ -130,3 +130,31 @@ def test_no_motor_pulls_across_a_jump_of_the_tension():
     assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-9)
     farther = follow(stronger, stalled.cables_mm + 1e-4 * (command - stalled.cables_mm))
     assert (stalled.tensions.max(), farther.tensions.max()) == pytest.approx((1.115, 300.0), rel=1e-3)
+
+
+def test_a_robot_snaps_to_rest_while_a_motor_lets_its_cable_out():
+    """The descent ends under loads that the motor cannot hold yet, and lets the cable out farther."""
+    rigidity = 5242.891707880753, 13584.332128660279, 2223.899500672998, 2714.1086498001, 5259.688538378054
+    rigidity += 3086.5982631237252, 2093.0091555507543, 5509.531965056304, 9065.460931028356, 5298.548194359921
+    rigidity += 3414.352517107732, 2063.8519260933767, 8968.33209506859, 2881.9372975064157, 3110.7580942041295
+    rigidity += 11453.403719979802, 9773.357515856753, 3024.129021756759
+    robot = SpatialRobot.prototype(
+        model="rod",
+        segments=18,
+        max_tension=15.0,
+        cables=(
+            Cable(offset_mm=4.736824863386806, end=7),
+            Cable(angle=math.pi / 2, offset_mm=5.149602288473183),
+            Cable(angle=math.pi, offset_mm=5.724292298352526, end=7),
+        ),
+        torsion_ratio=1.675968147348699,
+        segment_rigidity=rigidity,
+        weight_per_length=(0.012073713247048484, 0.003992768020843243, 0.0031592735376558545),
+    )
+    ball = Sphere(center=(14.09947883220876, 12.889999232841292, 106.5348561362253), radius=10.70204816604527)
+    solver = SpatialSolver(robot, Scene([ball]))
+    rest = solver.rest()
+    assert rest.status is Status.STALLED
+    assert max(solver.optimality(rest)) < 1e-9
+    assert rest.tensions.max() == pytest.approx(15.0, rel=1e-6)
+    assert rest.cables_mm == pytest.approx([0.0, 0.0, -0.80056657], abs=1e-6)
