@@ -68,9 +68,7 @@ def test_a_descent_leaves_a_contact_that_stays_closed_without_sliding_along_it_a
         model="rod",
         segments=9,
         torsion_ratio=1.221507,
-        cables=[
-            Cable(angle=angle, offset_mm=offset) for angle, offset in (*cables, (4.392779243453158, 7.715015630888579))
-        ],
+        cables=[Cable(angle=angle, offset_mm=offset) for angle, offset in cables],
     )
     center = 5.148608, -73.177348, 77.045733
     solver = SpatialSolver(robot, Scene([Sphere(center=center, radius=36.909137, spring=8.035536)]))
