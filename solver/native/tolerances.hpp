@@ -119,9 +119,10 @@ inline constexpr double kDescentMove = 0.0225;  // largest motion of a point in 
 inline constexpr int kDescentShortenings = 4;   // of an iterate that moved farther, or through an obstacle
 inline constexpr double kProgress = 1e-3;       // least motion of an iterate after its restoration, over that before it
 inline constexpr int kFlat = 8;                 // iterates that lose no energy, after which a saddle is suspected
-inline constexpr int kFruitless = 64;           // the same, after which a descent that wanders in roundoff ends
-inline constexpr int kSofteningRounds = 16;     // of inverse iteration for the direction of least curvature
-inline constexpr int kBucklings = 12;           // bends out of a shape, each half of the last and to the other side
-inline constexpr int kSaddleTries = 10;         // steps along it, each a quarter of the last
+inline constexpr int kPatience = 32;         // iterates that drop a gap which H needs, after which one slides along it
+inline constexpr int kFruitless = 64;        // the same, after which a descent that wanders in roundoff ends
+inline constexpr int kSofteningRounds = 16;  // of inverse iteration for the direction of least curvature
+inline constexpr int kBucklings = 12;        // bends out of a shape, each half of the last and to the other side
+inline constexpr int kSaddleTries = 10;      // steps along it, each a quarter of the last
 
 }  // namespace ccr::tolerances

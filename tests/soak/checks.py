@@ -30,6 +30,7 @@ REPEATS = 300  # of a command that was given up on, each of which must come near
 PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
 STALLED_AGAIN = 3  # stalled steps of an episode that are repeated
 MOVED_ON = 1e-4  # of the offset: a repeated command that stalled must not lead farther
+WITHIN_BAND = 1e-3  # the same, where the tension rises on the way, within its band
 BUCKLED = 0.9  # of the tension 12 EI/l0² of all cables, at which segments in line buckle one by one
 UNPULLED = 10  # contact force over the tension: beyond what the cables can cause
 CERTIFIED = 1e-7  # in natural units: stationarity · L, gaps / L, complementarity, sign · L
@@ -151,8 +152,9 @@ def _stalled(solver, taken):
     stalled = np.flatnonzero([state.status == Status.STALLED for state in taken.states[1:]])
     for k in stalled[:: max(1, len(stalled) // STALLED_AGAIN)].tolist():
         state = taken.states[k + 1]
-        moved = _distance(step(solver, state, taken.commands[k]), command_of(state))
-        if moved > MOVED_ON:
+        again = step(solver, state, taken.commands[k])
+        moved, rises = _distance(again, command_of(state)), np.max(again.tensions) > np.max(state.tensions)
+        if moved > (WITHIN_BAND if rises else MOVED_ON):
             return [Finding("stalled, but goes on", k, float(moved))]
     return []
 

@@ -13,7 +13,8 @@ using namespace tolerances;
 // the way to this one; back to `present_` where there is none, or where the motor would have to hold too much.
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command) {
-  const bool motor_holds = !only_releases(command) && !moves_obstacles(command);
+  const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
+  const bool motor_holds = !loading && !only_releases(command) && !moves_obstacles(command);
   const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
   if (!bends_evenly_ && !problem_.touches_obstacle(present_.active)) {

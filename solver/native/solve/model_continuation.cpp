@@ -175,19 +175,11 @@ bool ModelContinuation<Model>::resume(Pursuit& pursuit) const {
   return true;
 }
 
-// Whether a gap closed from `present_` to `trial_`, before which the tension may have fallen though it rises now.
-template <class Model>
-bool ModelContinuation<Model>::gap_closed() const {
-  const ActiveSet &before = present_.active, &now = trial_.active;
-  const auto begin = before.contact.begin(), end = begin + before.count;
-  return std::any_of(now.contact.begin(), now.contact.begin() + now.count,
-                     [&](int contact) { return std::find(begin, end, contact) == end; });
-}
-
 // One sub-step towards a command at a distance; false at the end of the pursuit.
 template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
   double& step = pursuit.step;
+  if (step > kPeakStep && !pursuit.refined && peaks_at_limit(goal, remaining)) step = kPeakStep;
   bool stalled = layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) &&
                  goal.length == present_.command.length && !moves_obstacles(goal);
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
@@ -203,9 +195,9 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     pursuit.refined = false;
     if (size >= kSmallestStep) pursuit.finest = kSmallestStep;
   } else if (move == Move::kOverTension) {
-    const bool may_fall = !stalled && size > kPeakStep && is_at_tension_limit() && gap_closed();
+    const bool may_fall = !stalled && size > kSmallestStep && is_at_tension_limit() && gap_closed();
     stalled = stalled || (!may_fall && approach_tension_limit());
-    step = may_fall ? kPeakStep : size / 2;
+    step = may_fall ? std::min(size / 2, kPeakStep) : size / 2;
   } else if (size > pursuit.finest || (size > kTightStep && is_tight() && !is_blocked(next))) {
     step = size / 2;
     pursuit.refined = true;

@@ -75,7 +75,6 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Status pursue(const Command& target);
   bool resume(Pursuit& pursuit) const;
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
-  bool gap_closed() const;
   bool give_way(Pursuit& pursuit, const Command& next, double size);
   bool refine(Pursuit& pursuit, double size, bool blocked);
   Command raise_to_pretension(Command wanted) const;
@@ -129,6 +128,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // The tension limit.
   bool is_at_tension_limit() const;
   bool is_tight() const;
+  bool gap_closed() const;
+  bool peaks_at_limit(const Command& goal, double remaining);
   bool approach_tension_limit();
   void share_motion(Command& goal, bool holds) const;
   bool pay_out(const Command& command);

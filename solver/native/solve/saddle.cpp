@@ -85,7 +85,7 @@ bool Newton<Model>::leave_saddle(Iterate& at, double largest) {
 }
 
 // Solves for the step without the active gap that is pressed least, with only the damping that its absence needs; where
-// that gap stays closed nevertheless, for the step along it.
+// that gap stays closed nevertheless, iterate after iterate, for the step along it.
 template <class Model>
 bool Newton<Model>::release_lowest(const Iterate& at, ActiveSet& target) {
   target = at.active;
@@ -98,7 +98,7 @@ bool Newton<Model>::release_lowest(const Iterate& at, ActiveSet& target) {
   needed_damping_ = 0;
   const bool solved = factor_convexified(target, kDescentPenalties) && qp_.solve(problem, kkt_, target, step_);
   const auto end = target.contact.begin() + target.count;
-  if (solved && std::find(target.contact.begin(), end, contact) == end) return true;
+  if (solved && (dropped_ <= kPatience || std::find(target.contact.begin(), end, contact) == end)) return true;
   problem.reduced_gradient(at.active);
   return solved && slide_along(at.active, target);
 }

@@ -27,6 +27,23 @@ void ModelContinuation<Model>::keep_last_held(const Iterate& held) {
   was_exceeded_ = true;
 }
 
+// Whether a gap closed from `present_` to `trial_`, before which the tension may have fallen though it rises now.
+template <class Model>
+bool ModelContinuation<Model>::gap_closed() const {
+  const ActiveSet &before = present_.active, &now = trial_.active;
+  const auto begin = before.contact.begin(), end = begin + before.count;
+  return std::any_of(now.contact.begin(), now.contact.begin() + now.count,
+                     [&](int contact) { return std::find(begin, end, contact) == end; });
+}
+
+// Whether the tension, which is at its limit, rises at once where the robot is fed or drawn, so that a longer sub-step
+// could end behind a peak: the work of the base hides it.
+template <class Model>
+bool ModelContinuation<Model>::peaks_at_limit(const Command& goal, double remaining) {
+  if (!is_at_tension_limit() || goal.length == present_.command.length || moves_obstacles(goal)) return false;
+  return try_command(between(present_.command, goal, std::min(1.0, kPeakStep / remaining))) == Move::kOverTension;
+}
+
 // `present_` is below the tension limit, `trial_` above: closes in from below by false position (Illinois), aiming into
 // the middle of the accepted band, with the cables that `trial_` takes beyond the limit: others may be held at it
 // already. False where the branch cannot be followed that far, unless the tension jumps over the limit within the
@@ -51,8 +68,10 @@ bool ModelContinuation<Model>::approach_tension_limit() {
     if (!(width * span > kCommandResolution)) break;
     const double middle =
         std::clamp(high - width * excess / (excess - shortage), low + 1e-3 * width, high - 1e-3 * width);
-    const Move move = try_command(between(start, end, middle));
+    Move move = try_command(between(start, end, middle));
     if (move == Move::kRejected) return width * span <= kSmallestStep;
+    // A sub-step may be so small that no cable seems to be pulled in.
+    if (highest(trial_tensions_) > limit && highest(tensions_) <= limit) move = Move::kOverTension;
     if (move == Move::kAccepted) {
       accept();
       low = middle;
@@ -165,15 +184,17 @@ bool ModelContinuation<Model>::is_blocked(const Command& command) {
   return balance <= kBalance * pressed;
 }
 
-#define CCR_INSTANTIATE(Model)                                                  \
-  template bool ModelContinuation<Model>::is_at_tension_limit() const;          \
-  template bool ModelContinuation<Model>::is_tight() const;                     \
-  template void ModelContinuation<Model>::keep_last_held(const Iterate&);       \
-  template bool ModelContinuation<Model>::approach_tension_limit();             \
-  template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;  \
-  template bool ModelContinuation<Model>::yield_cables(Command&, double) const; \
-  template void ModelContinuation<Model>::wait_for_motors(Command&) const;      \
-  template bool ModelContinuation<Model>::is_unyielding() const;                \
+#define CCR_INSTANTIATE(Model)                                                    \
+  template bool ModelContinuation<Model>::is_at_tension_limit() const;            \
+  template bool ModelContinuation<Model>::is_tight() const;                       \
+  template void ModelContinuation<Model>::keep_last_held(const Iterate&);         \
+  template bool ModelContinuation<Model>::gap_closed() const;                     \
+  template bool ModelContinuation<Model>::peaks_at_limit(const Command&, double); \
+  template bool ModelContinuation<Model>::approach_tension_limit();               \
+  template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;    \
+  template bool ModelContinuation<Model>::yield_cables(Command&, double) const;   \
+  template void ModelContinuation<Model>::wait_for_motors(Command&) const;        \
+  template bool ModelContinuation<Model>::is_unyielding() const;                  \
   template bool ModelContinuation<Model>::is_blocked(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

@@ -35,7 +35,7 @@ def test_every_step_given_up_on_is_looked_at():
     """One episode of eq. 13 that is given up on at several ends of its branch, most of them again and again."""
     tally, cases = play(Episode("space", 61, 36, 500))
     assert cases == []
-    assert tally.statuses["GAVE_UP"] > 50
+    assert tally.statuses["GAVE_UP"] > 10
     assert tally.reasons.total() == tally.statuses["GAVE_UP"]
     assert tally.reasons["not looked at"] == 0
 

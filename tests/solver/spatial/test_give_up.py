@@ -59,3 +59,23 @@ def test_a_robot_that_no_limit_stops_is_blocked_where_it_coils_until_its_disks_m
         assert state.cables_mm[1] / command[1] == pytest.approx(0.846884, abs=1e-5)
         assert state.tensions.max() > 1000
         assert max(solver.optimality(state)) < 1e-7
+
+
+def test_a_descent_leaves_a_contact_that_stays_closed_without_sliding_along_it_at_once():
+    """The branch ends between two commands; small steps snap to the same place as one step does."""
+    cables = ((5.846493, 5.362754), (5.768661, 4.183464), (4.392779, 7.715016))
+    robot = SpatialRobot.prototype(
+        model="rod",
+        segments=9,
+        torsion_ratio=1.221507,
+        cables=[Cable(angle=angle, offset_mm=offset) for angle, offset in cables],
+    )
+    center = 5.148608, -73.177348, 77.045733
+    solver = SpatialSolver(robot, Scene([Sphere(center=center, radius=36.909137, spring=8.035536)]))
+    start = solver.step(solver.rest(), (4.325514, 4.27849, 22.266013))
+    goal = np.array([8.255952, 7.145837, 18.462971])
+    state, small = solver.step(start, goal), start
+    for share in (0.25, 0.5, 0.75, 0.9, 1):
+        small = solver.step(small, start.cables_mm + share * (goal - start.cables_mm))
+    assert state.status is small.status is Status.SNAPPED
+    assert state.nodes == pytest.approx(small.nodes, abs=1e-6 * robot.length_mm)

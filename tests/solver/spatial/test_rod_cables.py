@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from soak.episodes import Episode, setting_of
 from soak.walks import sample_increments, walk
 
 from solver import Cable, Scene, Status
-from solver.spatial import SpatialRobot, SpatialSolver
+from solver.spatial import SpatialRobot, SpatialSolver, Sphere
 
 
 @pytest.mark.parametrize("count", [3, 4, 6])
@@ -77,6 +78,11 @@ def test_a_gap_out_of_reach_among_those_that_conflict_is_not_followed():
     assert max(state.status for state in states) < Status.GAVE_UP
 
 
+def follow(solver, *commands):
+    """Return the state after commands from rest."""
+    return reduce(solver.step, commands, solver.rest())
+
+
 def test_a_robot_stalls_where_the_tension_jumps_over_the_limit():
     """Cables that hold a robot tight leave it no way; where others become taut, tensions change without a motion."""
     angles = 5.662756963532212, 1.9606877533948088, 4.734160137367538, 3.3922960372330353, 1.1103390078608542
@@ -90,16 +96,65 @@ def test_a_robot_stalls_where_the_tension_jumps_over_the_limit():
     )
     start = 1.70554835364947, -1.3189854078846355, 0.8323239569614271, -1.2790937597617007
     start += -0.038388482335240025, 0.5570297109661813
+    near = -5.40655447, 7.35827771, -7.4264462, -0.52067067, 6.02357317, 4.10324375
     command = -5.406554466591348, 7.3596201982790275, -7.426446198236546, -0.5197058122344402
     command += 6.024511040758811, 4.103792845397489
     solver, stronger = (SpatialSolver(replace(robot, max_tension=limit), Scene()) for limit in (100.0, 130.0))
-    stalled = solver.step(solver.step(solver.rest(), start), command)
+    stalled = follow(solver, start, near, command)
     again = solver.step(stalled, command)
     assert stalled.status is again.status is Status.STALLED
     assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-6)
     assert stalled.tensions.max() == pytest.approx(98.373, abs=1e-3)
     farther = stalled.cables_mm + 1e-4 * (np.array(command) - stalled.cables_mm)
-    on = stronger.step(stronger.step(stronger.rest(), start), farther)
+    on = follow(stronger, start, near, farther)
     assert on.cables_mm == pytest.approx(farther, abs=1e-9)
     assert on.nodes == pytest.approx(stalled.nodes, abs=2e-3)
     assert on.tensions.max() == pytest.approx(106.763, abs=1e-3)
+
+
+def test_no_motor_pulls_across_a_jump_of_the_tension():
+    """A sub-step so close to the jump that it pulls no cable in, but for rounding, is not one that only lets out."""
+    robot = SpatialRobot.prototype(
+        model="rod",
+        segments=18,
+        between=1,
+        cables=tuple(Cable(angle=math.pi / 2 * quarter) for quarter in range(5)),
+        torsion_ratio=1.022244741527736,
+    )
+    command = np.array([-2.6523284174233144, -2.69361358272645, 2.582094007069561])
+    command = np.append(command, [2.7144816961851554, -2.4466038268875936])
+    solver, stronger = (SpatialSolver(replace(robot, max_tension=limit), Scene()) for limit in (15.0, 1000.0))
+    stalled = follow(solver, command)
+    again = solver.step(stalled, command)
+    assert stalled.status is again.status is Status.STALLED
+    assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-9)
+    farther = follow(stronger, stalled.cables_mm + 1e-4 * (command - stalled.cables_mm))
+    assert (stalled.tensions.max(), farther.tensions.max()) == pytest.approx((1.115, 300.0), rel=1e-3)
+
+
+def test_a_robot_snaps_to_rest_while_a_motor_lets_its_cable_out():
+    """The descent ends under loads that the motor cannot hold yet, and lets the cable out farther."""
+    rigidity = 5242.891707880753, 13584.332128660279, 2223.899500672998, 2714.1086498001, 5259.688538378054
+    rigidity += 3086.5982631237252, 2093.0091555507543, 5509.531965056304, 9065.460931028356, 5298.548194359921
+    rigidity += 3414.352517107732, 2063.8519260933767, 8968.33209506859, 2881.9372975064157, 3110.7580942041295
+    rigidity += 11453.403719979802, 9773.357515856753, 3024.129021756759
+    robot = SpatialRobot.prototype(
+        model="rod",
+        segments=18,
+        max_tension=15.0,
+        cables=(
+            Cable(offset_mm=4.736824863386806, end=7),
+            Cable(angle=math.pi / 2, offset_mm=5.149602288473183),
+            Cable(angle=math.pi, offset_mm=5.724292298352526, end=7),
+        ),
+        torsion_ratio=1.675968147348699,
+        segment_rigidity=rigidity,
+        weight_per_length=(0.012073713247048484, 0.003992768020843243, 0.0031592735376558545),
+    )
+    ball = Sphere(center=(14.09947883220876, 12.889999232841292, 106.5348561362253), radius=10.70204816604527)
+    solver = SpatialSolver(robot, Scene([ball]))
+    rest = solver.rest()
+    assert rest.status is Status.STALLED
+    assert max(solver.optimality(rest)) < 1e-9
+    assert rest.tensions.max() == pytest.approx(15.0, rel=1e-6)
+    assert rest.cables_mm == pytest.approx([0.0, 0.0, -0.80056657], abs=1e-6)

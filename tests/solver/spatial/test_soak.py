@@ -24,8 +24,8 @@ def test_nothing_is_found_in_random_episodes():
         tally.add(counted)
         cases += found
     assert {case["kind"] for case in cases} <= {"gave up"}
-    assert len({tuple(case["episode"]) for case in cases}) <= SHORT // STEPS // 3  # it goes on from there in vain
-    assert tally.steps == SHORT
+    assert len({tuple(case["episode"]) for case in cases}) <= SHORT // STEPS // 3
+    assert tally.steps > 0.8 * SHORT  # walks end there
     assert tally.contact > SHORT / 10
     assert tally.traced > 0
     assert tally.certified > 0
