@@ -48,7 +48,10 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
   clear_trend();
   evaluate_present();
   if (highest(tensions_) > problem_.robot().max_tension) {
-    if (motor_holds) return undo_descent(End::kOverTension);
+    if (motor_holds) {
+      over_limit_ = tensions_;
+      return undo_descent(End::kOverTension);
+    }
     if (held) keep_last_held(descent_start_);
   }
   double farthest = 0;

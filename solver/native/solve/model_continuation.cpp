@@ -138,6 +138,7 @@ template <class Model>
 Status ModelContinuation<Model>::pursue(const Command& target) {
   Pursuit pursuit{.target = target};
   newton_.begin_step();
+  over_limit_ = {};
   const double limit = problem_.robot().max_tension;
   for (int sub = 0; sub < kSubSteps && !work_is_spent(); ++sub) {
     // A release may lead to more tension than a motor holds: it yields until it holds again.

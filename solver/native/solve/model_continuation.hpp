@@ -170,6 +170,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Trend<Model> trend_;  // at `present_`
   double energy_ = 0;   // of `present_`
   Tensions tensions_{}, trial_tensions_{};
+  Tensions over_limit_{};           // of the last shape of this step that the motors could not hold
   bool present_evaluated_ = false;  // whether the contact problem is evaluated at `present_`
 
   StepResult result_;  // of the step under way

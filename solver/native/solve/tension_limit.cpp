@@ -71,7 +71,10 @@ bool ModelContinuation<Model>::approach_tension_limit() {
     Move move = try_command(between(start, end, middle));
     if (move == Move::kRejected) return width * span <= kSmallestStep;
     // A sub-step may be so small that no cable seems to be pulled in.
-    if (highest(trial_tensions_) > limit && highest(tensions_) <= limit) move = Move::kOverTension;
+    if (highest(trial_tensions_) > limit && highest(tensions_) <= limit) {
+      over_limit_ = trial_tensions_;
+      move = Move::kOverTension;
+    }
     if (move == Move::kAccepted) {
       accept();
       low = middle;
@@ -88,21 +91,22 @@ bool ModelContinuation<Model>::approach_tension_limit() {
   return true;
 }
 
-// Gives up pulling the cables whose tension is at the limit, or else all that are pulled. False where there is one
-// cable.
+// Gives up pulling the cables whose tension is at the limit, or else those whose tension jumps over it, or else all
+// that are pulled. False where there is one cable.
 template <class Model>
 bool ModelContinuation<Model>::hold_stalled_cables(Command& wanted) const {
   if (layout_.cables.size == 1) return false;
-  const auto give_up = [&](double tension) {
+  const double limit = problem_.robot().max_tension;
+  const auto give_up = [&](const Tensions& tensions, double least) {
     bool held = false;
     for (int k = 0; k < kCables; ++k) {
-      if (tensions_[k] < tension || !pulls_in(wanted, k)) continue;
+      if (tensions[k] < least || !pulls_in(wanted, k)) continue;
       wanted.cables[k] = present_.command.cables[k];
       held = true;
     }
     return held;
   };
-  return give_up(problem_.robot().max_tension * (1 - kTensionBand)) || give_up(-HUGE_VAL);
+  return give_up(tensions_, limit * (1 - kTensionBand)) || give_up(over_limit_, limit) || give_up(tensions_, -HUGE_VAL);
 }
 
 // Lets out, by at least so much, the cables whose motors cannot hold them. False where the command lets them out

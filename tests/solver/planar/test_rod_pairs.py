@@ -65,3 +65,18 @@ def test_a_pair_of_all_too_strong_motors_buckles_the_robot():
     assert buckled.tensions == pytest.approx(np.full(2, 6 * 5000 / 10**2), rel=0.05)  # 6 EI/l0² each
     assert max(solver.optimality(buckled)) < 1e-9
     assert free.status <= Status.SNAPPED
+
+
+@pytest.mark.parametrize(
+    ("preset", "command"), [("snake_arm", (20.0, -25.0, 5.0, 5.0)), ("neuroendoscope", (0.6, -0.8, 0.2, 0.2))]
+)
+def test_a_locked_pair_does_not_keep_others_from_being_pulled(preset, command):
+    """Only the pair of the tip stalls, however small the steps are."""
+    solver = Solver(Robot.preset(preset), Scene())
+    small = solver.rest()
+    once = solver.step(small, command)
+    for part in np.linspace(0.05, 1, 20):
+        small = solver.step(small, part * np.array(command))
+    assert once.status is small.status is Status.STALLED
+    assert small.cables_mm[:2] == pytest.approx(command[:2])
+    assert small.nodes == pytest.approx(once.nodes, abs=1e-6 * solver.robot.length_mm)
