@@ -53,12 +53,12 @@ bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& co
   for (int i = 0; i < n; ++i) chords_[i] = move_up(arcs_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
   add_strain(controls);
   take_up_cables(alike);
-  return std::isfinite(objective) && widest <= tolerances::kWidestTurn;
+  return std::isfinite(objective) && widest <= tolerances::kWidestTurn && widest_twist <= robot_.rod.widest_twist;
 }
 
 void SpatialRod::add_strain(const std::vector<Control>& controls) {
   const double *stiffness = robot_.rod.stiffness.data(), *rest = robot_.rod.rest.data();
-  double energy = 0, largest = 0, square = 0;
+  double energy = 0, largest = 0, square = 0, twist = 0;
   for (int i = 0; i < robot_.segments; ++i, stiffness += kControl, rest += kControl) {
     for (int k = 0; k < kControl; ++k) {
       const double strain = controls[i][k] - rest[k], twice = 2 * stiffness[k];
@@ -67,10 +67,12 @@ void SpatialRod::add_strain(const std::vector<Control>& controls) {
       largest = std::max(largest, twice * std::max(std::abs(strain), std::abs(controls[i][k])));
     }
     square = std::max(square, dot(controls[i], controls[i]));
+    twist = std::max(twist, std::abs(controls[i][2]));
   }
   objective = energy;
   max_objective_slope = largest;
   widest = std::sqrt(square);
+  widest_twist = twist;
 }
 
 void SpatialRod::take_up_cables(bool alike) {
