@@ -57,14 +57,14 @@ def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> 
     )
 
 
-def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray, widest_twist: float = math.inf) -> _kernel.Rod:
+def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray, bounded_twist: float = math.inf) -> _kernel.Rod:
     """Return what the kernel needs to know of a rod.
 
     Args:
         robot: The robot.
         stiffness: EI, in space also GJ, of each segment over the robot's rigidity, ``(n,)`` or ``(n, 3)``.
         rest: Angles of each segment at rest, likewise [rad].
-        widest_twist: Largest twist of a segment in space [rad].
+        bounded_twist: Twist of a segment in space up to which no edge is too long [rad].
     """
     cables, weight = full_cables(robot), (*robot.weight_per_length, 0.0)[:3]
     loads = [
@@ -79,5 +79,5 @@ def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray, widest_tw
         weight=weight,
         loads=loads,
         least_pull=least_cable_mm(robot),
-        widest_twist=widest_twist,
+        bounded_twist=bounded_twist,
     )

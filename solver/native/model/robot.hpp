@@ -35,8 +35,8 @@ struct Rod {
   std::vector<double> rest;       // controls of each segment at rest: its precurvature [rad]
   Vec<3> weight{};                // of a unit of length, in the base frame [N/mm]
   std::vector<Load> loads;
-  double least_pull = 0;           // of a cable [mm]
-  double widest_twist = HUGE_VAL;  // of a segment in space, which bounds the longest edges [rad]
+  double least_pull = 0;            // of a cable [mm]
+  double bounded_twist = HUGE_VAL;  // of a segment in space, up to which no edge is too long [rad]
 };
 
 struct Robot {

@@ -53,12 +53,12 @@ bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& co
   for (int i = 0; i < n; ++i) chords_[i] = move_up(arcs_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
   add_strain(controls);
   take_up_cables(alike);
-  return std::isfinite(objective) && widest <= tolerances::kWidestTurn && widest_twist <= robot_.rod.widest_twist;
+  return std::isfinite(objective) && widest <= tolerances::kWidestTurn && keeps_edges(controls);
 }
 
 void SpatialRod::add_strain(const std::vector<Control>& controls) {
   const double *stiffness = robot_.rod.stiffness.data(), *rest = robot_.rod.rest.data();
-  double energy = 0, largest = 0, square = 0, twist = 0;
+  double energy = 0, largest = 0, square = 0;
   for (int i = 0; i < robot_.segments; ++i, stiffness += kControl, rest += kControl) {
     for (int k = 0; k < kControl; ++k) {
       const double strain = controls[i][k] - rest[k], twice = 2 * stiffness[k];
@@ -67,12 +67,27 @@ void SpatialRod::add_strain(const std::vector<Control>& controls) {
       largest = std::max(largest, twice * std::max(std::abs(strain), std::abs(controls[i][k])));
     }
     square = std::max(square, dot(controls[i], controls[i]));
-    twist = std::max(twist, std::abs(controls[i][2]));
   }
   objective = energy;
   max_objective_slope = largest;
   widest = std::sqrt(square);
-  widest_twist = twist;
+}
+
+// Whether no segment twists so far while it bends that an edge beside it is longer than the longest. In the frame
+// halfway, a line at the distance r runs along c + g b r and across g τ r at most.
+bool SpatialRod::keeps_edges(const std::vector<Control>& controls) const {
+  const auto sinc = [](double half) { return half > 0 ? std::sin(half) / half : 1.0; };
+  for (const Control& control : controls) {
+    const double twist = std::abs(control[2]);
+    if (twist <= robot_.rod.bounded_twist) continue;
+    const double bent = std::hypot(control[0], control[1]);
+    const double chord = length_ * sinc(bent / 2), spread = sinc(std::hypot(bent, twist) / 2);
+    for (std::size_t line = 0; line < robot_.lines.size(); ++line) {
+      const double beside = spread * norm(robot_.lines[line]), longest = robot_.edges[line] * (robot_.between + 1);
+      if (std::hypot(chord + beside * bent, beside * twist) > longest) return false;
+    }
+  }
+  return true;
 }
 
 void SpatialRod::take_up_cables(bool alike) {

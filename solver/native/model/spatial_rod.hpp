@@ -71,10 +71,10 @@ class SpatialRod {
   double objective = 0;
   double max_objective_slope = 0;  // of the objective alone, in a control
   double widest = 0;               // largest rotation of a segment
-  double widest_twist = 0;         // largest twist of a segment, either way
 
  private:
   void add_strain(const std::vector<Control>& controls);
+  bool keeps_edges(const std::vector<Control>& controls) const;
   void take_up_cables(bool alike);
 
   Robot robot_;
