@@ -67,8 +67,9 @@ def test_in_space(robot, turns, ways):
 def test_twisted_in_space(robot, turns, twists, ways):
     """Each segment bends straight away from one of the lines, and twists by up to 0.5 rad."""
     angles = math.pi / 3 * np.array(ways) + math.pi / 2
-    sizes = 0.9 * most_turn(robot) * turns
-    curved = replace(robot, precurvature=tuple(zip(sizes * np.cos(angles), sizes * np.sin(angles), twists / 2)))
+    bends = 0.9 * most_turn(robot) * turns
+    rotations = np.column_stack([bends * np.cos(angles), bends * np.sin(angles), twists / 2])
+    curved = replace(robot, precurvature=tuple(map(tuple, rotations.tolist())))
     assert_bounded(spatial.SpatialSolver(curved, Scene()).rest().points, curved)
 
 
