@@ -175,6 +175,13 @@ class BaseSettings(Generic[RobotT]):
         return self.force_sensor and self.sensing != "sensorless"
 
     @property
+    def kind(self) -> dict[str, object]:
+        """What the arrays of a state depend on, by name, besides robot and task."""
+        sensing = "ideal" if self.sensors is None else "realistic" if self.senses_force else "sensorless"
+        fields = {"estimator": self.estimator, "regulate": self.regulate, "randomize": self.randomize}
+        return {"sensing": sensing, **fields}
+
+    @property
     def reach_mm(self) -> float:
         """Largest length of a robot [mm]."""
         return self.robot.longest_mm * (self.randomize.length[1] if self.randomize else 1.0)
