@@ -173,6 +173,12 @@ def test_runs_of_different_sensing_are_not_compared(run, tmp_path):
         suite.entries(EvaluateConfig(runs=(run, ideal)))
 
 
+def test_shipped_policies_of_another_sensing_are_said_to_be_so():
+    config = EvaluateConfig(policies=("PPO",), env_ids=("CCR/PushObstacle-v1",), sensing="sensorless")
+    with pytest.raises(UserError, match=r"were trained with realistic sensing .* not with sensorless"):
+        suite.entries(config)
+
+
 def test_a_policy_in_the_folder_of_another_is_named(tmp_path, monkeypatch, capsys):
     file = tmp_path / "Distilled" / "TrackForce-v1" / f"0{SUFFIX}"
     file.parent.mkdir(parents=True)
