@@ -205,6 +205,11 @@ def test_robots_that_obstacles_could_slip_through_are_refused():
         make("CCR/InsertAndPush-v1", randomize={"length": (0.9, 1.0), "offset": (1.0, 1.25)})
 
 
+def test_lengths_beyond_the_insertion_are_named_as_they_were_given():
+    with pytest.raises(ValueError, match=r"length of randomize is \(0.8, 1.1\); it must lie in \(0.875, 1.125\)"):
+        make("CCR/InsertAndPush-v1", randomize=RANGES)
+
+
 def test_robots_that_cannot_be_made_are_named():
     with pytest.raises(ValueError, match=r"randomize has robots that are refused: .*max_cable_mm"):
         make(
