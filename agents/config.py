@@ -225,8 +225,8 @@ def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:
 
 
 def _check_names(field: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
-    if not names or not set(names) <= set(known):
-        raise ValueError(f"{field} is {list(names)}; it must name some of {', '.join(known)}")
+    if not names or not set(names) <= set(known) or len(set(names)) < len(names):
+        raise ValueError(f"{field} is {list(names)}; it must name some of {', '.join(known)}, each once")
 
 
 def _check_counts(settings: object, *fields: str) -> None:

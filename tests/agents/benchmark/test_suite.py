@@ -151,6 +151,7 @@ def test_a_sweep_finds_settings_of_every_learner(learner, tmp_path, monkeypatch)
         ("train", "ppo", "--batch-size", "1"),
         ("train", "sac", "--tau", "-1"),
         ("train", "sarsa"),
+        ("evaluate", "--policies", "PI", "PI"),
         ("bench", "--steps", "0"),
         ("bench", "--steps", "150"),
         ("bench", "--seeds", "0"),
@@ -206,6 +207,8 @@ def test_a_run_too_short_for_a_learning_curve_is_evaluated(tmp_path, monkeypatch
     monkeypatch.setattr(sys, "argv", ["ccr-gym", "evaluate", "--runs", str(run), *arguments])
     cli.main()
     assert (tmp_path / "out" / "curves.png").exists()
+    assert "videos" not in capsys.readouterr().out
+    assert not (tmp_path / "out" / "videos").exists()
 
 
 def test_names_of_policies_and_environments_are_checked():
