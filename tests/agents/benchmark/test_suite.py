@@ -94,6 +94,23 @@ def test_the_share_that_is_closed_and_whether_intervals_are_apart():
     assert report.is_below(good, rivals)
     assert not report.is_below(poor, rivals)
     assert report.closed(good, rivals[1:]) is None
+    exact = [result("PI", np.full(20, 2e-5)), rivals[1]]
+    assert report.closed(good, exact) is None
+
+
+def test_environments_without_a_learner_have_no_learning_curves(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(report, "draw_curves", lambda curves, out: drawn.append(list(curves)))
+    for name in ("draw_episodes", "draw_scores", "draw_profiles"):
+        monkeypatch.setattr(report, name, lambda *_: None)
+    learned = LearnedPolicy(trained("PPO", "CCR/LoadCell-v1")[0]).training
+    metrics = {metric: np.ones((1, 20)) for metric in METRICS}
+    results = [
+        suite.Result(Entry(name, env_id, "realistic"), metrics, suite.summarize(metrics), trainings=trainings)
+        for name, env_id, trainings in (("PPO", "CCR/LoadCell-v1", (learned,)), ("PI", "CCR/SpatialPush-v1", ()))
+    ]
+    report._draw(report.group(results), EvaluateConfig(out=tmp_path))
+    assert drawn == [["CCR/LoadCell-v1"]]
 
 
 def test_retraining_fills_a_folder_as_that_of_the_shipped_policies(tmp_path):
