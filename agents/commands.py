@@ -70,12 +70,13 @@ def evaluate(config: EvaluateConfig) -> None:
     from agents.benchmark import report, suite
 
     entries = suite.entries(config)
-    (config.out / "videos").mkdir(parents=True, exist_ok=True)
+    (config.out / "videos" if config.video else config.out).mkdir(parents=True, exist_ok=True)
     results = list(track(suite.play_all(config, entries), "evaluate", len(entries)))
     report.write(sorted(results, key=lambda result: entries.index(result.entry)), config)
     print("Force error: root mean square after the search, as interquartile mean with its 95 % interval.")
-    print(f"closed: share of the gap from {report.BASELINE} to {report.BOUND}; * where the intervals do not overlap.")
-    print(f"Written: {config.out}/evaluation.json, evaluation.md, figures and videos")
+    baseline, bound = report.BASELINE, report.BOUND
+    print(f"closed: share of the gap from {baseline} to {bound}; * where the interval lies below that of {baseline}.")
+    print(f"Written: {config.out}/evaluation.json, evaluation.md, figures{' and videos' if config.video else ''}")
 
 
 def retrain(config: RetrainConfig) -> None:

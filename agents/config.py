@@ -46,8 +46,8 @@ class TrainConfig:
     """Run folder: receives the actor, its configuration, the latest checkpoint and the TensorBoard log."""
     env_id: str = "CCR/PushObstacle-v1"
     """Environment to train on."""
-    sensing: Literal["ideal", "realistic"] = "realistic"
-    """Sensors and motors: perfect, or with backlash, latency, noise and unknown rigidity."""
+    sensing: Literal["ideal", "realistic", "sensorless"] = "realistic"
+    """Sensors and motors: perfect, with backlash, latency, noise and unknown rigidity, or so without force sensor."""
     seed: int = 0
     """Seed of the learner and of the first environment's scenes; below 900 000, where validation begins."""
     threads: int = 2
@@ -59,7 +59,7 @@ class TrainConfig:
 
     def __post_init__(self) -> None:
         _check_choice("env_id", self.env_id, tuple(ENV_IDS))
-        _check_choice("sensing", self.sensing, ("ideal", "realistic"))
+        _check_choice("sensing", self.sensing, ("ideal", "realistic", "sensorless"))
         _check_counts(self, "threads")
         _check_learner(self.learner)
         last = VALIDATION_SEED - self.learner.envs
@@ -225,8 +225,8 @@ def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:
 
 
 def _check_names(field: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
-    if not names or not set(names) <= set(known):
-        raise ValueError(f"{field} is {list(names)}; it must name some of {', '.join(known)}")
+    if not names or not set(names) <= set(known) or len(set(names)) < len(names):
+        raise ValueError(f"{field} is {list(names)}; it must name some of {', '.join(known)}, each once")
 
 
 def _check_counts(settings: object, *fields: str) -> None:

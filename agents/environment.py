@@ -1,5 +1,7 @@
 """Environments as policies use them."""
 
+from collections.abc import Mapping
+
 import gymnasium
 import numpy as np
 
@@ -29,3 +31,15 @@ def require_env(env: Environment | None) -> Environment:
     if env is None:
         raise ValueError("env is None; this controller reads from its environment: call reset(env)")
     return env
+
+
+def require_entries(observation: Observation) -> None:
+    """Refuse an observation without named entries.
+
+    Raises:
+        ValueError: If it is none of ``obs_mode="dict"``.
+    """
+    if not isinstance(observation, Mapping):
+        raise ValueError(
+            f'the observation is a {type(observation).__name__}; policies need named entries: obs_mode="dict"'
+        )

@@ -98,7 +98,7 @@ class FreeRobots:
         """Bring some robots to rest, and let them be those that are drawn; ``None`` for the nominal robot."""
         for robot, own in zip(robots, drawn, strict=True):
             if own is not None:
-                self._lines_mm[robot] = self._adapter.lines_mm(own)
+                self._note_lines(robot, own)
                 for row in self._rows[robot].tolist():
                     self._batch.assign(row, Scene(), own)
         self._batch.rest(self._rows[robots].ravel().tolist())
@@ -110,6 +110,13 @@ class FreeRobots:
     def set_rows(self, robots: list[int], rows: Rows) -> None:
         """Put robots and their companions into states of :meth:`get_rows`."""
         self._batch.set_rows(self._rows[robots].ravel().tolist(), rows)
+        for robot, own in zip(robots, rows.robots[:: self._rows.shape[1]], strict=True):
+            if own is not None:
+                self._note_lines(robot, own)
+
+    def _note_lines(self, robot: int, own: Any) -> None:
+        """Note the lines of a robot that differs from the nominal one."""
+        self._lines_mm[robot] = self._adapter.lines_mm(own)
 
     def move(self, robots: np.ndarray, actuated_mm: np.ndarray) -> FreeMotion:
         """Move some robots to actuated coordinates ``(k, actions)`` [mm], and return their motion there."""

@@ -66,6 +66,11 @@ class Randomization:
         spans = np.where(high > low, high - low, np.inf)
         return np.asarray(np.clip((2 * shown - low - high) / spans, -1.0, 1.0))
 
+    def ratios(self, features: np.ndarray) -> np.ndarray:
+        """Return rigidity, length and offset over the nominal ones from what :meth:`features` returns, ``(..., 3)``."""
+        low, high = self._ends()
+        return np.asarray(np.exp((low + high + (high - low) * features[..., :-1]) / 2))
+
     def _ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the logarithms of the ends of the ranges of rigidity, length and offset."""
         low, high = np.log([self.rigidity, self.length, self.offset]).T

@@ -175,6 +175,13 @@ class BaseSettings(Generic[RobotT]):
         return self.force_sensor and self.sensing != "sensorless"
 
     @property
+    def kind(self) -> dict[str, object]:
+        """What the arrays of a state depend on, by name, besides robot and task."""
+        sensing = "ideal" if self.sensors is None else "realistic" if self.senses_force else "sensorless"
+        fields = {"estimator": self.estimator, "regulate": self.regulate, "randomize": self.randomize}
+        return {"sensing": sensing, **fields}
+
+    @property
     def reach_mm(self) -> float:
         """Largest length of a robot [mm]."""
         return self.robot.longest_mm * (self.randomize.length[1] if self.randomize else 1.0)
@@ -184,11 +191,23 @@ class BaseSettings(Generic[RobotT]):
         if self.randomize is None:
             return
         require(self.backend == "native", f"backend is {self.backend!r}; with randomize it must be 'native'")
+        self._check_insertion(self.randomize.length)
         try:
             for _ in self.randomize.corners(self.robot):
                 pass
         except ValueError as error:
             raise ValueError(f"randomize has robots that are refused: {error}") from error
+
+    def _check_insertion(self, ratios: tuple[float, ...]) -> None:
+        """Check that random lengths at rest lie in the range of insertion, which is the same for all robots."""
+        robot = self.robot
+        if isinstance(robot, Robot) and robot.length_range_mm is not None:
+            low, high = (end / robot.length_mm for end in robot.length_range_mm)
+            require(
+                low <= ratios[0] and ratios[1] <= high,
+                f"length of randomize is {ratios}; it must lie in ({low:.6g}, {high:.6g}), the length_range_mm of the "
+                "robot over its length_mm, which stays as it is",
+            )
 
     def _make_robot(self) -> RobotT:
         """Return the robot, which may be given by name, by its fields, or not at all."""

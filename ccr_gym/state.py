@@ -20,6 +20,7 @@ class EpisodeState:
     """Episodes of k robots: all that their next steps depend on but the generators.
 
     Attributes:
+        kind: Task and settings that its arrays depend on, by name.
         rows: The robots among their obstacles.
         model: What is known of them; ``None`` where sensing is ideal.
         starts: Their scenes at the start of the episodes.
@@ -29,6 +30,7 @@ class EpisodeState:
         sensors: Imperfections and the observations under way; empty where sensing is ideal.
     """
 
+    kind: Mapping[str, object]
     rows: Rows
     model: Rows | None
     starts: tuple[Scene | None, ...]
@@ -84,6 +86,20 @@ def check_state(state: object, count: int) -> None:
     assert isinstance(state, EnvState)
     if len(state.generators) != count:
         raise ValueError(f"state is of {len(state.generators)} environments; it must be of {count}")
+
+
+def check_alike(own: Mapping[str, object], given: Mapping[str, object]) -> None:
+    """Check that a state is of an environment of the same kind.
+
+    Raises:
+        ValueError: Naming what differs.
+    """
+    different = [name for name in own if own[name] != given[name]]
+    if different:
+        theirs, ours = (", ".join(f"{name} {kind[name]!r}" for name in different) for kind in (given, own))
+        raise ValueError(
+            f"the state is of an environment with {theirs}; this one has {ours}: take it from one of equal arguments"
+        )
 
 
 def state_of(generator: np.random.Generator | None) -> Mapping[str, Any] | None:

@@ -16,7 +16,7 @@ from ccr_gym.randomization import DRAWN_SIZE, Drawn
 from ccr_gym.sampling import Trials, check_robot
 from ccr_gym.sensing import Imperfections, SensorModel, sample_imperfections
 from ccr_gym.settings import AnySettings
-from ccr_gym.state import EpisodeState, put, take
+from ccr_gym.state import EpisodeState, check_alike, put, take
 from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment
 from solver import Equilibrium, Scene
 from solver.common.batch import BaseBatch
@@ -87,6 +87,7 @@ class Transition:
         self._task, self._settings, self.count, self._threads = task, settings, count, threads
         self._ranges = settings.sensors  # which are made and checked at each access
         self._target, self._vector = task.target, task.force_vector
+        self._kind = {"task": type(task).__name__, "force_vector": task.force_vector, **settings.kind}
         self._own = self._make_pipeline(task.obstacles)
         self._trials = Trials(task, settings, self._own.batch, self._own.adapter)
         self._use(self._own)
@@ -300,20 +301,20 @@ class Transition:
         sensors = {} if self._sensors is None else self._sensors.get_rows(robots)
         starts = tuple(self._starts[robot] for robot in robots)
         model = None if self._sensors is None else self.model.get_rows(robots)
-        return EpisodeState(
-            self.batch.get_rows(robots), model, starts, free, take(self, self._kept, robots), learnt, sensors
-        )
+        episode, rows = take(self, self._kept, robots), self.batch.get_rows(robots)
+        return EpisodeState(self._kind, rows, model, starts, free, episode, learnt, sensors)
 
     def set_rows(self, robots: list[int], state: EpisodeState) -> None:
         """Put robots into states of :meth:`get_rows`, from which they go on with the same bits.
 
         Raises:
-            ValueError: If they are states of other robots, or of an environment of another kind.
+            ValueError: If they are states of other robots, or of an environment of another kind; nothing has changed.
         """
-        self._check_alike(state)
+        check_alike(self._kind, state.kind)
         scenes = {len(scene) for scene in state.rows.scenes if scene is not None}
-        self._use(self._pipeline_for(scenes.pop() if scenes else self._task.obstacles))
-        self.batch.set_rows(robots, state.rows)
+        pipeline = self._pipeline_for(scenes.pop() if scenes else self._task.obstacles)
+        pipeline.batch.set_rows(robots, state.rows)
+        self._use(pipeline)
         self._estimator.set_rows(robots, state.estimator, state.free)
         put(self, state.episode, robots)
         for robot, start in zip(robots, state.starts, strict=True):
@@ -321,12 +322,6 @@ class Transition:
         if self._sensors is not None and state.model is not None:
             self._sensors.set_rows(robots, state.sensors)
             self.model.set_rows(robots, state.model)
-
-    def _check_alike(self, state: EpisodeState) -> None:
-        """Raise an error for a state that lacks a part that these episodes have, or has one that they lack."""
-        own = self._kept, self._sensors is not None
-        given = tuple(state.episode), bool(state.sensors)
-        require(own == given, "the state is of another task or sensing; take it from an environment of equal arguments")
 
     def equilibrium(self, robot: int) -> Equilibrium | SpatialEquilibrium:
         """Return a robot's present equilibrium; it is immutable."""

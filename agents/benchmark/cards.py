@@ -47,9 +47,11 @@ def _training(result: Result) -> str:
 def _sensing(sensing: str) -> str:
     if sensing == "ideal":
         return sensing
-    ranges = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in asdict(Sensing()).items())
+    without, fields = sensing == "sensorless", asdict(Sensing())
+    told = {name: ends for name, ends in fields.items() if not (without and name.startswith("force_"))}
+    ranges = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in told.items())
     units = "forces in EI/L², tensions in EI/(aL), play in a, places in L, angles in rad, latency in steps"
-    return f"{ranges} ({units})"
+    return f"{'no force sensor; ' if without else ''}{ranges} ({units})"
 
 
 def _result(result: Result, rivals: list[Result], config: EvaluateConfig) -> str:

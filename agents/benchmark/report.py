@@ -18,6 +18,7 @@ from agents.learning.pretrained import folder_name
 NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
 WIDTH = 190  # of a printed table
 BOUND, BASELINE = "Oracle", "PI"
+SHOWN = 0.005  # smallest force error that a table shows [mN]; of less a share says nothing
 COLUMNS: dict[str, Callable[[JsonObject], str]] = {  # heading of a column, and its text from a summary
     "force error [mN]": lambda s: "{:.2f} [{:.2f}, {:.2f}]".format(s["rmse_iqm_mn"], *s["rmse_interval_mn"]),
     "first seed": lambda s: f"{s['rmse_of_seeds_mn'][0]:.2f}" if len(s["rmse_of_seeds_mn"]) > 1 else "",
@@ -67,8 +68,8 @@ def _draw(by_id: Grouped, config: EvaluateConfig) -> None:
     draw_scores({env_id: {r.entry.policy: r.summary for r in here} for env_id, here in by_id.items()}, config.out)
     errors = {env_id: {r.entry.policy: r.rmse.ravel() for r in here} for env_id, here in by_id.items()}
     draw_profiles(errors, config.out)
-    if any(result.trainings for here in by_id.values() for result in here):
-        draw_curves({env_id: _curves(here) for env_id, here in by_id.items()}, config.out)
+    if learned := {env_id: curves for env_id, here in by_id.items() if (curves := _curves(here))}:
+        draw_curves(learned, config.out)
 
 
 def group(results: list[Result]) -> Grouped:
@@ -80,9 +81,12 @@ def group(results: list[Result]) -> Grouped:
 
 
 def closed(result: Result, rivals: list[Result]) -> float | None:
-    """Return the share of the gap between the force errors of the baseline and the bound that a policy closes."""
+    """Return the share of the gap between the force errors of the baseline and the bound that a policy closes.
+
+    None where either is missing, or the error of the baseline is shown as zero.
+    """
     errors = {r.entry.policy: float(r.summary["rmse_iqm_mn"]) for r in rivals}
-    if BOUND not in errors or BASELINE not in errors:
+    if BOUND not in errors or BASELINE not in errors or errors[BASELINE] < SHOWN:
         return None
     return (errors[BASELINE] - float(result.summary["rmse_iqm_mn"])) / (errors[BASELINE] - errors[BOUND])
 

@@ -142,11 +142,23 @@ def _entries_of_package(config: EvaluateConfig) -> list[Entry]:
     ]
     learners = [policy for policy in config.policies if policy in LEARNERS]
     if learners and not any(entry.files for entry in found):
-        example = f"{config.pretrained}/{learners[0]}/{folder_name(config.env_ids[0])}/0{SUFFIX}"
-        raise UserError(f"no trained policy found, such as {example}; train them with ccr-gym retrain")
+        raise _no_policy(config, learners)
     for entry in found:
         _check_files(entry)
     return found
+
+
+def _no_policy(config: EvaluateConfig, learners: list[str]) -> UserError:
+    """Return the exception for an evaluation of learners, none of which has a policy for it."""
+    for other in config.env_ids:
+        if any(trained(learner, other, config.pretrained) for learner in learners):
+            return UserError(
+                f"the policies of {', '.join(learners)} in {config.pretrained} were trained with {sensing_of(other)} "
+                f"sensing on {other}, not with {config.sensing}; leave out --sensing, or train with ccr-gym train "
+                f"--sensing {config.sensing} and evaluate --runs"
+            )
+    example = f"{config.pretrained}/{learners[0]}/{folder_name(config.env_ids[0])}/0{SUFFIX}"
+    return UserError(f"no trained policy found, such as {example}; train them with ccr-gym retrain")
 
 
 def _check_files(entry: Entry) -> None:

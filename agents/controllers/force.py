@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.environment import Environment, require_env
+from agents.environment import Environment, require_entries, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search
 from agents.tuned import P_GAINS, PI_GAINS, tuned_for
@@ -58,7 +58,12 @@ class ForceController:
         self._estimator, self._span = RobotEstimator(settings, 1), settings.force_span
 
     def act(self, observation: Observation) -> np.ndarray:
-        """Return the search action until something touches, then control the force."""
+        """Return the search action until something touches, then control the force.
+
+        Raises:
+            ValueError: If the observation is none of ``obs_mode="dict"``.
+        """
+        require_entries(observation)
         force = float(self._estimator.update_one(observation).force)
         if not observation["contact"].any():
             self._last = None

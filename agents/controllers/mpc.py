@@ -6,7 +6,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from agents.environment import Environment, require_env
+from agents.environment import Environment, require_entries, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search, set_points
 from agents.tuned import MPCSettings
@@ -50,7 +50,12 @@ class PredictiveController:
         self._step = 0
 
     def act(self, observation: Observation) -> np.ndarray:
-        """Return the search action until something touches, then the first move of a plan."""
+        """Return the search action until something touches, then the first move of a plan.
+
+        Raises:
+            ValueError: If the observation is none of ``obs_mode="dict"``.
+        """
+        require_entries(observation)
         direction, settings = search(observation), self._env.get_wrapper_attr("settings")
         span, travel = settings.actuation.sections**3, settings.scales.travel_mm
         along = direction[: observation["cable"].size] / float(direction @ direction)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.environment import Environment, require_env
+from agents.environment import Environment, require_entries, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, motor_actions, natural, search, set_points
 from agents.tuned import NEWTON_GAIN
@@ -54,7 +54,12 @@ class NewtonController:
         self._estimator = RobotEstimator(self._env.get_wrapper_attr("settings"), 1)
 
     def act(self, observation: Observation) -> np.ndarray:
-        """Return the search action until something touches, then a step to the force of the set-point."""
+        """Return the search action until something touches, then a step to the force of the set-point.
+
+        Raises:
+            ValueError: If the observation is none of ``obs_mode="dict"``.
+        """
+        require_entries(observation)
         scales = self._env.get_wrapper_attr("settings").scales
         known = state = natural(self._env.get_wrapper_attr("privileged_state"), scales)
         if not self.oracle:

@@ -8,7 +8,7 @@ import numpy as np
 from agents.environment import EnvIndex
 from agents.estimation.candidates import ALL, Candidates, Loops
 from agents.estimation.force import ForceFilter
-from agents.estimation.shape import observed_commands
+from agents.estimation.shape import observed_commands, observed_sizes
 from agents.estimation.tension import TensionFilter
 from ccr_gym import EXACT, Settings, SpatialSettings
 
@@ -54,13 +54,16 @@ class RobotEstimator:
     contact force from virtual work: what the cable pulls more than the free robot needs, over the lever of the contact.
     A force sensor, where there is one, corrects the force with the delay that was found.
 
+    Offset and length of random robots are read from the observation; where ``randomize`` hides them, the robots are
+    taken to be the nominal one.
+
     Args:
         settings: Settings of the environments.
         count: Number N of robots.
     """
 
     def __init__(self, settings: Settings | SpatialSettings, count: int) -> None:
-        self._robot, self._actuation = settings.robot, settings.actuation
+        self._settings, self._actuation = settings, settings.actuation
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
         self._tension_span = settings.tension_span
         sensing = settings.sensors or EXACT
@@ -115,8 +118,9 @@ class RobotEstimator:
 
     def _update_shape(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
         """Compare the seen shape with each candidate; return log-likelihoods ``(k, L, B)``."""
-        seen = observed_commands(observation, self._robot)
-        errors = seen[:, None, :, None] - self.loops.places[index][:, self._candidates.latencies]
+        seen, (_, offset) = observed_commands(observation, self._settings), observed_sizes(observation, self._settings)
+        places = self.loops.places[index][:, self._candidates.latencies] / offset[:, None, None, None]
+        errors = seen[:, None, :, None] - places  # in units of the robot's own offset, as noise is one of angles
         self._errors[index] += errors
         self._squares[index] += errors**2
         self._seen[index] += 1

@@ -4,43 +4,58 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ccr_gym import Settings, SpatialSettings
 from solver import Robot
 from solver.spatial import SpatialRobot
 
 
-def observed_commands(observation: Mapping[str, np.ndarray], robot: Robot | SpatialRobot) -> np.ndarray:
-    """Return the commands of the sections that the observed shape tells, ``(..., commands)`` [a].
+def observed_commands(observation: Mapping[str, np.ndarray], settings: Settings | SpatialSettings) -> np.ndarray:
+    """Return the commands of the sections that the observed shape tells, ``(..., commands)`` [a of the robot].
 
     A command is half of what a line of holes on the inner side is shorter than that on the outer side, which run
     straight from disk to disk: so errors of the disks' places, which both share, take themselves out. The backbone of
     the rod consists of arcs, which are longer than their chords; that of the paper's model of chords (eq. 5).
 
     Args:
-        observation: The observation of one robot, or of many.
-        robot: The robot.
+        observation: The observation of one robot, or of many; where robots are random, its entry ``robot`` tells their
+            offset and length, and without the entry they are taken to be the nominal ones.
+        settings: Settings of the environment.
     """
+    robot, (length, offset) = settings.robot, observed_sizes(observation, settings)
     nodes = observation["nodes"].astype(float).reshape(*observation["nodes"].shape[:-1], -1, 3)
     if isinstance(robot, Robot):
-        points, sides = _planar_shape(nodes, robot)
+        points, sides = _planar_shape(nodes, settings.reach_mm)
     else:
-        points = robot.length_mm * nodes
+        points = settings.reach_mm * nodes
         sides = _sides_in_space(observation["frames"].astype(float).reshape(*nodes.shape[:-1], 2, 3), robot)
-    holes = robot.offset_mm * sides
+    offset_mm, length_mm = robot.offset_mm * offset[..., None, None], robot.length_mm * length[..., None, None]
+    holes = offset_mm[..., None] * sides
     ends = {robot.segments if cable.end is None else cable.end for cable in robot.cables}
     starts = [0] if robot.model == "paper" else [0, *sorted(ends)[:-1]]
     inner, outer = (_chords(points[..., None, :] + side * holes) for side in (1, -1))
-    bends = (outer - inner) / (2 * robot.offset_mm)
+    bends = (outer - inner) / (2 * offset_mm)
     commands = np.add.reduceat(bends, starts, axis=-2)
     if robot.model == "rod":
         turns = np.linalg.norm(bends, axis=-1, keepdims=True)
-        longer = robot.length_mm / robot.segments / robot.offset_mm * (1 - np.sinc(turns / (2 * np.pi)))
+        longer = length_mm / robot.segments / offset_mm * (1 - np.sinc(turns / (2 * np.pi)))
         commands = commands + np.sign(commands) * np.add.reduceat(longer, starts, axis=-2)
     return np.asarray(commands.reshape(*nodes.shape[:-2], -1))
 
 
-def _planar_shape(nodes: np.ndarray, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+def observed_sizes(
+    observation: Mapping[str, np.ndarray], settings: Settings | SpatialSettings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return length and offset of robots over the nominal ones, ``(...)`` each, 1 where nothing tells them."""
+    if settings.randomize is None or "robot" not in observation:
+        one = np.ones(observation["nodes"].shape[:-1])
+        return one, one
+    ratios = settings.randomize.ratios(observation["robot"].astype(float))
+    return ratios[..., 1], ratios[..., 2]
+
+
+def _planar_shape(nodes: np.ndarray, reach_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Return points, and the side of the cable at every disk, ``(..., n + 1, 1, 2)``."""
-    points, angles = robot.longest_mm * nodes[..., :2], np.pi * nodes[..., 2]
+    points, angles = reach_mm * nodes[..., :2], np.pi * nodes[..., 2]
     return points, np.stack([np.cos(angles), np.sin(angles)], axis=-1)[..., None, :]
 
 

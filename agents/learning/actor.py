@@ -15,7 +15,7 @@ from gymnasium import spaces
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 
 from agents.config import TrainConfig
-from agents.environment import Environment, make_env
+from agents.environment import Environment, make_env, require_entries
 from agents.errors import UserError
 from agents.files import JsonObject
 from agents.learning.checks import Form, check_curve, check_real, check_tensors
@@ -136,8 +136,10 @@ class LearnedPolicy:
         """Return the mean action for a dictionary observation.
 
         Raises:
-            ValueError: If the observation is not one of the environment and sensing that the policy was trained with.
+            ValueError: If the observation is none of ``obs_mode="dict"``, or not of the environment and sensing that
+                the policy was trained with.
         """
+        require_entries(observation)
         shapes = {key: value.shape for key, value in observation.items()}
         if shapes != self._shapes:
             trained = f"{self.training.config.env_id} with {self.training.config.sensing} sensing"

@@ -139,6 +139,33 @@ def test_states_keep_the_robot():
     assert np.array_equal(*ends)
 
 
+@pytest.mark.parametrize("sensing", ["ideal", "realistic"])
+@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/BracedPush-v1"])
+def test_states_and_forks_keep_the_lines_of_the_drawn_robot(env_id, sensing):
+    kwargs = {"randomize": {"offset": (0.8, 1.25)}, "sensing": sensing}
+    env, other = make(env_id, **kwargs).unwrapped, make(env_id, **kwargs).unwrapped
+    envs = gymnasium.make_vec(env_id, 2, vectorization_mode="vector_entry_point", **kwargs)
+    action = np.full(env.action_space.shape, 0.6, np.float32)
+    touched = False
+    for seed in range(4):
+        env.reset(seed=seed)
+        other.reset(seed=100 + seed)
+        envs.reset(seed=seed)
+        for _ in range(25):
+            env.step(action)
+            envs.step(np.stack([action, action]))
+        other.set_state(env.get_state())
+        envs.fork([0, 0])
+        for _ in range(8):
+            one, two = env.step(action), other.step(action)
+            assert np.array_equal(one[0], two[0])
+            assert np.array_equal(one[4]["force_est"], two[4]["force_est"])
+            touched |= bool(np.any(one[4]["force_est"]))
+            forked = envs.step(np.stack([action, action]))[4]["force_est"]
+            assert np.array_equal(forked[0], forked[1])
+    assert touched
+
+
 def test_unobserved_robots_keep_the_observation_of_the_nominal_robot():
     hidden, plain = make(randomize={**RANGES, "observed": False}), make(randomize=None, sensing=EXACT)
     assert hidden.observation_space == plain.observation_space
@@ -176,6 +203,11 @@ def test_impossible_ranges_are_refused(given, message):
 def test_robots_that_obstacles_could_slip_through_are_refused():
     with pytest.raises(ValueError, match="slip between points"):
         make("CCR/InsertAndPush-v1", randomize={"length": (0.9, 1.0), "offset": (1.0, 1.25)})
+
+
+def test_lengths_beyond_the_insertion_are_named_as_they_were_given():
+    with pytest.raises(ValueError, match=r"length of randomize is \(0.8, 1.1\); it must lie in \(0.875, 1.125\)"):
+        make("CCR/InsertAndPush-v1", randomize=RANGES)
 
 
 def test_robots_that_cannot_be_made_are_named():

@@ -145,20 +145,45 @@ def test_other_states_are_refused_and_change_nothing(state, error, message):
     assert np.array_equal(env.step(np.zeros(1, np.float32))[0], before)
 
 
-@pytest.mark.parametrize("env_id", ["CCR/MovingObstacle-v1", "CCR/TrackForce-v1"])
-@pytest.mark.parametrize("sensing", ["ideal", "realistic"])
-def test_states_of_another_kind_are_refused_and_change_nothing(env_id, sensing):
-    env, others = make("CCR/PushObstacle-v1"), [make(env_id, sensing=sensing)]
-    if sensing == "realistic":
-        others.append(make("CCR/PushObstacle-v1", sensing=sensing))
+@pytest.mark.parametrize(
+    ("kwargs", "names"),
+    [
+        ({"env_id": "CCR/MovingObstacle-v1"}, "task 'MovingObstacle'"),
+        ({"env_id": "CCR/TrackForce-v1"}, "task 'TrackForce'"),
+        ({"env_id": "CCR/SoftObstacle-v1"}, "task 'SoftObstacle'"),
+        ({"sensing": "ideal"}, "sensing 'ideal'"),
+        ({"sensing": "sensorless"}, "sensing 'sensorless'"),
+        ({"regulate": "estimate"}, "regulate 'estimate'"),
+        ({"estimator": "paper"}, "estimator 'paper'"),
+        ({"randomize": {"offset": (0.8, 1.25)}}, "randomize Randomization"),
+    ],
+)
+def test_states_of_another_kind_are_refused_and_change_nothing(kwargs, names):
+    usual = {"env_id": "CCR/PushObstacle-v1", "sensing": "realistic"}
+    env, other = make(**usual), make(**{**usual, **kwargs})
+    for one, two in ((env, other), (other, env)):
+        one.reset(seed=0)
+        two.reset(seed=1)
+        action = np.full(one.action_space.shape, 0.7, np.float32)
+        for _ in range(20):
+            one.step(action)
+            two.step(action)
+        twin = copy.deepcopy(one)
+        with pytest.raises(ValueError, match="the state is of an environment with") as caught:
+            one.set_state(two.get_state())
+        assert names in str(caught.value)
+        same(one.step(action), twin.step(action))
+
+
+def test_a_state_of_another_robot_among_other_obstacles_changes_nothing():
+    env, other = make("CCR/PushObstacle-v1"), make("CCR/PushObstacle-v1", robot="guidewire")
+    far = 4 * other.settings.robot.length_mm
+    scene = [Circle(center=(side * far, far), radius=far / 9) for side in (-1, 1)]
     env.reset(seed=0)
-    before = env.step(np.ones(1, np.float32))[0]
-    for other in others:
-        other.reset(seed=1)
-        for one, two in ((env, other), (other, env)):
-            with pytest.raises(ValueError, match="another task or sensing"):
-                one.set_state(two.get_state())
-    assert np.array_equal(env.step(np.zeros(1, np.float32))[0], before)
+    other.reset(options={"scene": scene, "desired_force": other.settings.scales.force_n})
+    with pytest.raises(ValueError, match="another robot"):
+        env.set_state(other.get_state())
+    assert len(env.equilibrium.scene) == 1
 
 
 @pytest.mark.parametrize("indices", [[0, 1], [0, 1, 2, 4], [-1, 0, 0, 0], [0.5, 0, 0, 0], None])

@@ -94,6 +94,23 @@ def test_the_share_that_is_closed_and_whether_intervals_are_apart():
     assert report.is_below(good, rivals)
     assert not report.is_below(poor, rivals)
     assert report.closed(good, rivals[1:]) is None
+    exact = [result("PI", np.full(20, 2e-5)), rivals[1]]
+    assert report.closed(good, exact) is None
+
+
+def test_environments_without_a_learner_have_no_learning_curves(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(report, "draw_curves", lambda curves, out: drawn.append(list(curves)))
+    for name in ("draw_episodes", "draw_scores", "draw_profiles"):
+        monkeypatch.setattr(report, name, lambda *_: None)
+    learned = LearnedPolicy(trained("PPO", "CCR/LoadCell-v1")[0]).training
+    metrics = {metric: np.ones((1, 20)) for metric in METRICS}
+    results = [
+        suite.Result(Entry(name, env_id, "realistic"), metrics, suite.summarize(metrics), trainings=trainings)
+        for name, env_id, trainings in (("PPO", "CCR/LoadCell-v1", (learned,)), ("PI", "CCR/SpatialPush-v1", ()))
+    ]
+    report._draw(report.group(results), EvaluateConfig(out=tmp_path))
+    assert drawn == [["CCR/LoadCell-v1"]]
 
 
 def test_retraining_fills_a_folder_as_that_of_the_shipped_policies(tmp_path):
@@ -151,6 +168,7 @@ def test_a_sweep_finds_settings_of_every_learner(learner, tmp_path, monkeypatch)
         ("train", "ppo", "--batch-size", "1"),
         ("train", "sac", "--tau", "-1"),
         ("train", "sarsa"),
+        ("evaluate", "--policies", "PI", "PI"),
         ("bench", "--steps", "0"),
         ("bench", "--steps", "150"),
         ("bench", "--seeds", "0"),
@@ -171,6 +189,12 @@ def test_runs_of_different_sensing_are_not_compared(run, tmp_path):
     ideal = train(TrainConfig(run=tmp_path, sensing="ideal", learner=SMALL, threads=1), progress=False)
     with pytest.raises(ValueError, match="runs must have the same sensing"):
         suite.entries(EvaluateConfig(runs=(run, ideal)))
+
+
+def test_shipped_policies_of_another_sensing_are_said_to_be_so():
+    config = EvaluateConfig(policies=("PPO",), env_ids=("CCR/PushObstacle-v1",), sensing="sensorless")
+    with pytest.raises(UserError, match=r"were trained with realistic sensing .* not with sensorless"):
+        suite.entries(config)
 
 
 def test_a_policy_in_the_folder_of_another_is_named(tmp_path, monkeypatch, capsys):
@@ -200,6 +224,8 @@ def test_a_run_too_short_for_a_learning_curve_is_evaluated(tmp_path, monkeypatch
     monkeypatch.setattr(sys, "argv", ["ccr-gym", "evaluate", "--runs", str(run), *arguments])
     cli.main()
     assert (tmp_path / "out" / "curves.png").exists()
+    assert "videos" not in capsys.readouterr().out
+    assert not (tmp_path / "out" / "videos").exists()
 
 
 def test_names_of_policies_and_environments_are_checked():

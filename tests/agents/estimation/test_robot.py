@@ -12,12 +12,13 @@ STEPS, COUNT = 64, 250
 NUMBERS = ("latency", "half_backlash", "loss", "rigidity", "force")
 
 
-def probed(env_id, sensing, count=COUNT, seed=5):
+def probed(env_id, sensing, count=COUNT, seed=5, randomize=None):
     """Play episodes that pull, reverse once before contact, and then bring the force to its set-point.
 
     Returns what is known at the end, the truth, and whether a robot touches.
     """
-    envs = gymnasium.make_vec(env_id, count, sensing=sensing, obs_mode="dict", autoreset_mode="Disabled")
+    kwargs = {"sensing": sensing, "randomize": randomize, "obs_mode": "dict", "autoreset_mode": "Disabled"}
+    envs = gymnasium.make_vec(env_id, count, **kwargs)
     settings = envs.unwrapped.settings
     observation, _ = envs.reset(seed=seed)
     estimator = RobotEstimator(settings, count)
@@ -59,6 +60,13 @@ def test_the_truth_is_within_two_standard_deviations(env_id, sensing):
     assert np.median(error) < 0.08
     assert np.median(np.abs(known.loss - truth["loss"])) < 0.012
     assert np.median(np.abs(known.rigidity / truth["rigidity"] - 1)) < 0.02
+    assert np.array_equal(np.rint(known.latency), truth["latency"])
+
+
+def test_random_robots_are_estimated_from_the_sizes_that_are_observed():
+    known, truth, touching = probed("CCR/PushObstacle-v1", "realistic", 100, randomize={"offset": (0.8, 1.25)})
+    for name in NUMBERS:
+        assert covered(known, truth, touching, name) >= 0.9, name
     assert np.array_equal(np.rint(known.latency), truth["latency"])
 
 

@@ -385,6 +385,17 @@ def test_a_damaged_checkpoint_is_refused_and_runs_nothing(tmp_path, monkeypatch,
     assert path.read_bytes() != content
 
 
+@pytest.mark.parametrize("name", ["PPO", "SAC"])
+def test_a_policy_without_a_force_sensor_trains_and_acts(name, tmp_path):
+    config = TrainConfig(run=tmp_path, sensing="sensorless", learner=replace(SMALL[name], steps=512), threads=1)
+    policy = LearnedPolicy(train(config, progress=False))
+    assert policy.training.config.sensing == "sensorless"
+    env = make_env(config.env_id, sensing="sensorless")
+    assert env.action_space.contains(policy.act(env.reset(seed=0)[0]))
+    with pytest.raises(ValueError, match="with sensorless sensing"):
+        policy.act(make_env(config.env_id, sensing="realistic").reset(seed=0)[0])
+
+
 def test_an_observation_of_another_environment_is_refused():
     policy = LearnedPolicy(trained("Distilled", "CCR/PushObstacle-v1")[0])
     env = make_env("CCR/TrackForce-v1", sensing="realistic")
