@@ -153,8 +153,7 @@ def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
 
 
 def _kernel_rod(robot: SpatialRobot) -> _kernel.Rod:
-    at_rest = np.broadcast_to(robot.precurvature, (robot.segments, 3))
-    return kernel_rod(robot, stiffness_ratios(robot), at_rest, robot.bounded_twist)
+    return kernel_rod(robot, stiffness_ratios(robot), np.broadcast_to(robot.precurvature, (robot.segments, 3)))
 
 
 def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:
