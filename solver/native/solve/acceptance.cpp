@@ -44,10 +44,7 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   const bool pulled = pulls_cable(command) && command.length == present_.command.length && !moves_obstacles(command);
   const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
   const bool rising = pulled || (!loading && !only_releases(command) && tension > highest(tensions_));
-  if (rising && tension > limit) {
-    over_limit_ = trial_tensions_;
-    return Move::kOverTension;
-  }
+  if (rising && tension > limit) return Move::kOverTension;
   // The tension may exceed the limit in between and fall again. Work of the cables beyond that of a linear tension
   // bounds the mean excess over the straight line; the peak is at most twice the mean.
   const double hump = std::max(0.0, -loss) * 2 * problem_.energy_scale() / (distance * problem_.robot().offset);

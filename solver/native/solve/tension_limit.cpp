@@ -51,11 +51,11 @@ bool ModelContinuation<Model>::peaks_at_limit(const Command& goal, double remain
 template <class Model>
 bool ModelContinuation<Model>::approach_tension_limit() {
   const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
-  Tensions above = trial_tensions_;
+  over_limit_ = trial_tensions_;
   const auto approaching = [&] {
-    double tension = highest(above) > limit ? -HUGE_VAL : highest(tensions_);
+    double tension = highest(over_limit_) > limit ? -HUGE_VAL : highest(tensions_);
     for (int k = 0; k < kCables; ++k)
-      if (above[k] > limit) tension = std::max(tension, tensions_[k]);
+      if (over_limit_[k] > limit) tension = std::max(tension, tensions_[k]);
     return tension;
   };
   const Command start = present_.command, end = trial_.command;
@@ -71,10 +71,7 @@ bool ModelContinuation<Model>::approach_tension_limit() {
     Move move = try_command(between(start, end, middle));
     if (move == Move::kRejected) return width * span <= kSmallestStep;
     // A sub-step may be so small that no cable seems to be pulled in.
-    if (highest(trial_tensions_) > limit && highest(tensions_) <= limit) {
-      over_limit_ = trial_tensions_;
-      move = Move::kOverTension;
-    }
+    if (highest(trial_tensions_) > limit && highest(tensions_) <= limit) move = Move::kOverTension;
     if (move == Move::kAccepted) {
       accept();
       low = middle;
@@ -82,7 +79,7 @@ bool ModelContinuation<Model>::approach_tension_limit() {
       if (move == last) excess /= 2;
     } else {
       high = middle;
-      above = trial_tensions_;
+      over_limit_ = trial_tensions_;
       excess = highest(trial_tensions_) - aim;
       if (move == last) shortage /= 2;
     }
