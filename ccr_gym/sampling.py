@@ -78,7 +78,7 @@ class Trials:
         for _ in range(MAX_SAMPLES):
             own = {k: drawn[k].robot or self._batch.robot for k in waiting}
             sampled = {k: _sample_split(self._task, own[k], generators[k], self._split) for k in waiting}
-            clear = [k for k in waiting if self._place(robots[k], sampled[k].scene, drawn[k])]
+            clear = [k for k in waiting if self._batch.assign_if_clear(robots[k], sampled[k].scene, drawn[k].robot)]
             if not clear:
                 continue
             found, forces = self._pull(
@@ -94,13 +94,6 @@ class Trials:
             f"none of {MAX_SAMPLES} samples of {self._task} can be pushed as desired within {self._limit_mm:.6g} mm of "
             "cable and the tension limit; widen the task's ranges, or either limit"
         )
-
-    def _place(self, robot: int, scene: Scene, drawn: Drawn) -> bool:
-        """Put a robot among obstacles if they leave it clear, and return whether they do."""
-        clear = self._batch.leaves_clear(scene, drawn.robot)
-        if clear:
-            self._batch.assign(robot, scene, drawn.robot)
-        return clear
 
     def _pull(
         self, robots: list[int], assignments: list[Assignment], imperfections: list[Imperfections | None]

@@ -101,23 +101,34 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
                 has changed then.
             TypeError: If ``scene`` is not a scene, or ``robot`` not one of the batch's space.
         """
+        if not self.assign_if_clear(index, scene, robot):
+            robot = robot or self.robot
+            check_clear(robot, scene, self._straight_of(robot).gaps(scene))
+
+    def assign_if_clear(self, index: int, scene: Scene, robot: RobotT_co | None = None) -> bool:
+        """Assign a scene as :meth:`assign` if no obstacle overlaps the straight robot, and return whether none does.
+
+        Raises:
+            ValueError: As :meth:`assign`, but for obstacles that overlap; nothing has changed then.
+            TypeError: As :meth:`assign`.
+        """
         index, own = self._check_index(index), None if robot == self.robot else robot
         check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
         if (own, scene) == (self._robots[index], self._scenes[index]):
-            return
+            return True
         changes = own != self._robots[index]
         if changes and own is not None:
             self._check_own(own)
         robot = own or self.robot
         compiled = self._compile(robot, scene)
-        straight = self._straight_of(robot)
-        if not straight.is_clear_of(scene):
-            check_clear(robot, scene, straight.gaps(scene))
+        if not self._straight_of(robot).is_clear_of(scene):
+            return False
         made = self._kernel_robot(own) if changes and own is not None else None
         with self._exclusive:
             self._put(index, scene, compiled)
             self._become(index, own, made)
             self._unrested.add(index)
+        return True
 
     def assign_alike(self, index: int, other: Self) -> None:
         """Assign the scene and the robot at an index of another batch of an equal robot, as :meth:`assign`, but faster.
@@ -131,16 +142,6 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         with self._exclusive:
             self._put(self._check_index(index), scene, other._compiled[index])
             self._unrested.add(index)
-
-    def leaves_clear(self, scene: Scene, robot: RobotT_co | None = None) -> bool:
-        """Return whether no obstacle of a scene overlaps the straight robot, that of the batch where none is given.
-
-        Raises:
-            ValueError: If an obstacle is of another space, or names a node that the robot does not have.
-            TypeError: If ``scene`` is not a scene.
-        """
-        check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
-        return self._straight_of(robot or self.robot).is_clear_of(scene)
 
     def rest(self, robots: Sequence[int]) -> None:
         """Bring some robots to rest again, as ``rest()`` of their solver.

@@ -74,9 +74,10 @@ def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
     Raises:
         ValueError: If an obstacle names a node that the robot does not have.
     """
+    every = _all_points(len(scene), len(robot.lines_mm), robot.positions)
     if all(obstacle.nodes is None for obstacle in scene):
-        return _all_points(robot, len(scene))
-    touchable = _all_points(robot, len(scene)).copy()
+        return every
+    touchable = every.copy()
     for points, obstacle in zip(touchable, scene, strict=True):
         if obstacle.nodes is not None:
             points[:] = False
@@ -85,9 +86,9 @@ def touchable_points(robot: AnyRobot, scene: Scene) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _all_points(robot: AnyRobot, obstacles: int) -> np.ndarray:
+def _all_points(obstacles: int, lines: int, positions: int) -> np.ndarray:
     """Return that all points can touch, ``(m, lines, positions)`` bool, an array that is shared and not written to."""
-    touchable = np.ones((obstacles, len(robot.lines_mm), robot.positions), bool)
+    touchable = np.ones((obstacles, lines, positions), bool)
     touchable.flags.writeable = False
     return touchable
 
