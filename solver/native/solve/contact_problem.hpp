@@ -112,6 +112,9 @@ class ContactProblem {
   // Evaluates energy, points and gaps, if not done already; false where a control is out of range of the segment law.
   bool evaluate(const Iterate& at);
 
+  // Sets the limit of the tensions; that of the robot until then.
+  void limit_tensions(double limit) { robot_.max_tension = limit; }
+
   // Lets the motor of a rod's cable keep a tension [N], infinite for one that holds its length instead: the length then
   // follows the shape, and the cable is a load of the robot and no longer one of its gaps.
   void keep_tension(int cable, double tension);

@@ -186,10 +186,37 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command
   }
 }
 
+// Where cables that no limit stops lock a robot that touches nothing, to first order: takes it to the command past
+// their balance, with motors of growing strength that let their cables follow meanwhile. False where it is not reached
+// before geometry blocks the robot.
+template <class Model>
+bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
+  const Robot& robot = problem_.robot();
+  if (!Model::kRod || layout_.cables.size == 1 || std::isfinite(robot.max_tension)) return false;
+  if (problem_.touches_obstacle(present_.active) || moves_obstacles(target)) return false;
+  const double unit = robot.rigidity / (robot.offset * robot.max_length);
+  locked_ = present_;
+  bool reached = false;
+  for (double limit = kFirstLimit * unit; !reached && limit < kTight * unit && !work_is_spent(); limit *= 2) {
+    evaluate_present();
+    if (highest(tensions_) > limit) continue;
+    problem_.limit_tensions(limit);
+    pursue(target);
+    reached = command_distance(present_.command, target) <= kCommandResolution;
+  }
+  problem_.limit_tensions(HUGE_VAL);
+  if (!reached) present_ = locked_;
+  present_evaluated_ = false;
+  evaluate_present();
+  if (!reached) record_shape();
+  return reached;
+}
+
 #define CCR_INSTANTIATE(Model)                                                                                         \
   template double ModelContinuation<Model>::highest_held(const Tensions&) const;                                       \
   template bool ModelContinuation<Model>::stop_holding(const Command&);                                                \
   template void ModelContinuation<Model>::hold_length(int);                                                            \
+  template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
   template void ModelContinuation<Model>::hold_lengths();                                                              \
   template void ModelContinuation<Model>::add_kept_tension(int, ActiveSet&) const;                                     \
   template void ModelContinuation<Model>::follow_lengths(Command&) const;                                              \

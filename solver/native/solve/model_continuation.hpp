@@ -152,6 +152,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   void keep_tension(int cable);
   void hold_length(int cable);
   void hold_lengths();
+  bool pass_with_limit(const Command& target);
   void add_kept_tension(int cable, ActiveSet& active) const;
   void follow_lengths(Command& command) const;
   void leave_kept(Command& goal) const;
@@ -209,6 +210,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool has_trend_ = false;
   Iterate back_;                   // scratch of `way_back_returns`
   std::vector<Control> unloaded_;  // scratch of `is_blocked`: slope of the energy alone
+  Iterate locked_;                 // where cables lock the robot, to first order
   Iterate descent_start_;          // where a descent began, and its points, mounts and recorded shapes
   std::vector<Position> descent_points_, descent_mounts_;
   std::size_t descent_trace_ = 0;
