@@ -24,14 +24,16 @@ double ModelContinuation<Model>::highest_held(const Tensions& tensions) const {
 // raises it to there, or else all that are at the limit. False where there are none but those that do, or one cable.
 template <class Model>
 bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
-  if (!Model::kRod || layout_.cables.size == 1) return false;
-  evaluate_present();
-  const double limit = problem_.robot().max_tension;
-  if (highest_held(tensions_) > limit) return false;
-  if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted)) return true;
-  Tensions all;
-  all.v.fill(HUGE_VAL);
-  return keep_tensions_at_limit(all);
+  if constexpr (Model::kRod) {
+    if (layout_.cables.size == 1) return false;
+    evaluate_present();
+    if (highest_held(tensions_) > problem_.robot().max_tension) return false;
+    if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted)) return true;
+    Tensions all;
+    all.v.fill(HUGE_VAL);
+    return keep_tensions_at_limit(all);
+  }
+  return false;
 }
 
 // Lets the motors at the limit keep their tension, among those that some tensions exceed it of.
@@ -61,13 +63,13 @@ bool ModelContinuation<Model>::raise_to_limit(const Command& wanted) {
   return raised;
 }
 
-// Raises the tension of one cable, whose length follows, up to an aim. Where its command or the limit of another comes
-// first, it is held there. False where it is not raised at all.
+// Raises the tension of one cable, whose length follows, up to an aim, and lets its motor keep it. False where its
+// ceiling or the limit of another comes first: it is held there.
 template <class Model>
 bool ModelContinuation<Model>::raise_tension(int cable, double aim, double ceiling) {
-  const double start = tensions_[cable], limit = problem_.robot().max_tension;
+  const double limit = problem_.robot().max_tension;
   keep_tension(cable);
-  double rise = aim - start;
+  double rise = aim - tensions_[cable];
   for (int i = 0; i < kStallIterations && tensions_[cable] < aim; ++i) {
     const double tension = std::min(aim, tensions_[cable] + rise);
     problem_.keep_tension(cable, tension);

@@ -1,7 +1,6 @@
 """Cables of the rod in space that pull against each other."""
 
 import math
-from dataclasses import replace
 from functools import reduce
 
 import numpy as np
