@@ -119,6 +119,15 @@ def test_powers_of_two_give_the_same_bits(model, s, episodes):
                 np.testing.assert_array_equal(value, expected[name], f"{name}, episode {index}, step {k}")
 
 
+def share_holes(robot, numbers):
+    """Return numbers with the tensions of cables through the same holes added up: only their sum is determinate."""
+    if "tensions" not in numbers:
+        return numbers
+    holes = [(round(math.cos(c.angle), 9), round(math.sin(c.angle), 9), c.offset_mm, c.end) for c in robot.cables]
+    sums = [sum(t for t, other in zip(numbers["tensions"], holes, strict=True) if other == hole) for hole in holes]
+    return numbers | {"tensions": np.array(sums)}
+
+
 @pytest.mark.parametrize("s", OTHERS)
 @pytest.mark.parametrize("model", [*MODELS, *LOADED])
 def test_other_scales_give_the_same_robot(model, s, episodes):
@@ -127,7 +136,7 @@ def test_other_scales_give_the_same_robot(model, s, episodes):
         length = solver.robot.length_mm
         for k, (state, large) in enumerate(zip(taken.states, scaled(solver, taken.commands, s), strict=True)):
             assert large.status.name == state.status.name, (index, k)
-            expected, found = natural(state), natural(large, s)
+            expected, found = (share_holes(solver.robot, numbers) for numbers in (natural(state), natural(large, s)))
             stopped = state.status == Status.STALLED and len(solver.robot.cables) > 1
             close = CLOSE_STALLED if stopped else CLOSE
             for name, unit in (("points", length), ("forces", 1.0), ("tension", 1.0), ("tensions", 1.0)):
