@@ -15,10 +15,14 @@ class Status(IntEnum):
     """The equilibrium became unstable on the way, and the robot moved, against what the slope of its branch predicts,
     to the one that is reached physically."""
     STALLED = 2
-    """The cable tension reached the robot's limit, or would exceed it in a snap; the cable moved as far as the limit.
+    """A motor at the robot's tension limit holds its cable short of the command, or a snap would exceed the limit.
 
-    A step in space may end below the limit with this status, where its motors would be overloaded on the way;
-    the same command may then lead farther in a further step.
+    The cable moved as far as the limit. Where a rod has several, the others go on as far as commanded: a
+    motor at its limit cannot hold, so it keeps its tension and its cable's length follows, in or out. Each motor then
+    either has met its command, or is at its limit. A command that every cable has met at the end is not reported as
+    stalled, whatever happened on the way.
+
+    In the paper's model of space, cables at the limit hold still, and a step may end below the limit with this status.
 
     Where a release ends in a snap to more tension than the motor holds, it yields: the cable goes farther than asked.
     """

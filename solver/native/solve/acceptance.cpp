@@ -9,10 +9,11 @@ namespace ccr {
 
 using namespace tolerances;
 
-// Leaves in `trial_` the shape of the free robot; false where it touched an obstacle, or would overlap one.
+// Leaves in `trial_` the shape of the free robot; false where it touched an obstacle, or would overlap one, or where
+// motors keep their tension.
 template <class Model>
 bool ModelContinuation<Model>::try_free_shape() {
-  if (problem_.touches_obstacle(trial_.active) || !bend_freely()) return false;
+  if (problem_.keeps_tensions() || problem_.touches_obstacle(trial_.active) || !bend_freely()) return false;
   return problem_.evaluate(trial_) && problem_.violation() <= kFeasibility * problem_.robot().max_length;
 }
 
@@ -48,7 +49,7 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   // The tension may exceed the limit in between and fall again. Work of the cables beyond that of a linear tension
   // bounds the mean excess over the straight line; the peak is at most twice the mean.
   const double hump = std::max(0.0, -loss) * 2 * problem_.energy_scale() / (distance * problem_.robot().offset);
-  const bool peaks = pulled && std::max(tension, highest(tensions_)) + hump > limit;
+  const bool peaks = pulled && std::max(highest_held(trial_tensions_), highest_held(tensions_)) + hump > limit;
   return peaks && distance > kPeakStep ? Move::kRejected : Move::kAccepted;
 }
 

@@ -51,12 +51,29 @@ bool ModelContinuation<Model>::only_releases(const Command& command) const {
          command.loads == present_.command.loads && !moves_obstacles(command) && !(command == present_.command);
 }
 
-#define CCR_INSTANTIATE(Model)                                                            \
-  template double ModelContinuation<Model>::travel(const Command&, const Command&) const; \
-  template double ModelContinuation<Model>::pull(const Command&, int) const;              \
-  template bool ModelContinuation<Model>::pulls_in(const Command&, int) const;            \
-  template bool ModelContinuation<Model>::pulls_cable(const Command&) const;              \
-  template bool ModelContinuation<Model>::only_releases(const Command&) const;            \
+// The command that is gone for: while anything touches, the cables are not slackened below a pretension, where they
+// alone give the robot its shape.
+template <class Model>
+ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(Command wanted) const {
+  const double pretension = kPretension * problem_.robot().offset;
+  if (Model::kRod || largest_displacement(wanted.cables) >= pretension || !problem_.touches_obstacle(present_.active))
+    return wanted;
+  int taut = 0;
+  for (int k = 1; k < kCables; ++k)
+    if (std::abs(present_.command.cables[k]) > std::abs(present_.command.cables[taut])) taut = k;
+  const double present = present_.command.cables[taut];
+  const double least = std::min(std::abs(present), pretension);
+  if (std::abs(wanted.cables[taut]) < least) wanted.cables[taut] = std::copysign(least, present);
+  return wanted;
+}
+
+#define CCR_INSTANTIATE(Model)                                                                             \
+  template double ModelContinuation<Model>::travel(const Command&, const Command&) const;                  \
+  template double ModelContinuation<Model>::pull(const Command&, int) const;                               \
+  template bool ModelContinuation<Model>::pulls_in(const Command&, int) const;                             \
+  template bool ModelContinuation<Model>::pulls_cable(const Command&) const;                               \
+  template bool ModelContinuation<Model>::only_releases(const Command&) const;                             \
+  template ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(Command) const; \
   template double ModelContinuation<Model>::command_distance(const Command&, const Command&) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

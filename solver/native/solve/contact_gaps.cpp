@@ -107,7 +107,8 @@ void ContactProblem<Model>::measure_slacks_and_disks(const Command& command) req
     gaps_[contact] = gap;
     near_.push_back(contact);
   };
-  for (int k = 0; k < model_.cables().count(); ++k) add(slack_contact(k), model_.cables().slack(k, command.cables[k]));
+  for (int k = 0; k < model_.cables().count(); ++k)
+    if (!keeps_tensions_ || !keeps_tension(k)) add(slack_contact(k), model_.cables().slack(k, command.cables[k]));
   const double close = tolerances::kDisksClose * (model_.segment_length() - robot_.disk_thickness) / robot_.disk_radius;
   if (model_.widest <= close) return;
   for (int i = 0; i < robot_.segments; ++i) {

@@ -21,6 +21,7 @@ ContactProblem<Model>::ContactProblem(const Robot& robot, int obstacles)
             std::numeric_limits<double>::infinity()),
       mount_of_(obstacles, -1),
       node_forces_(robot.segments + 1) {
+  kept_tensions_.v.fill(HUGE_VAL);
   near_.reserve(gaps_.size());
   set_robot(robot);
 }
@@ -66,7 +67,7 @@ bool ContactProblem<Model>::evaluate(const Iterate& at) {
   loaded_ = at.command.loads;
   if (is_moving()) place_obstacles(at.command.scene);
   update_springs(at.mounts);
-  if constexpr (Model::kRod) energy_ -= load_work();
+  if constexpr (Model::kRod) energy_ -= load_work() + (keeps_tensions_ ? kept_work() : 0.0);
   barrier_energy_ = 0;
   if (barrier_enabled_) add_barrier(at.controls);
   for (int i = 0; i <= robot_.segments; ++i)
@@ -209,7 +210,8 @@ template <class Model>
 double ContactProblem<Model>::stationarity_tolerance(const ActiveSet& active) const {
   const double scale = Model::kRod ? std::max(model_.max_objective_slope + load_slope_, tolerances::kUnbent)
                                    : model_.free_turn() * model_.free_turn();
-  double pressed = Model::kRod ? scale : model_.max_objective_slope;  // largest slope, of the objective or of a contact
+  double pressed = Model::kRod ? std::max(scale, kept_slope_)
+                               : model_.max_objective_slope;  // largest slope, of the objective or of a contact
   for (int j = 0; j < active.count; ++j)
     pressed = std::max(pressed, active.multiplier[j] * lever_arm(active.contact[j]));
   return tolerances::kStationarity * scale + tolerances::kRoundoff * pressed;
@@ -221,7 +223,7 @@ void ContactProblem<Model>::reduced_gradient(const ActiveSet& active) {
   has_gradient_ = true;
   pressed_ = active;
   std::fill(node_forces_.begin(), node_forces_.end(), State{});
-  Vec<Model::kCables> slack_multipliers{};
+  Tensions slack_multipliers = kept_multipliers_;
   if constexpr (Model::kRod) add_loads(node_forces_);
   for (std::size_t m = 0; m < springs_.size(); ++m) mount_gradient_[m] = times(springs_[m], displacements_[m]);
   for (int j = 0; j < active.count; ++j) {
@@ -311,7 +313,7 @@ void ContactProblem<Model>::lagrangian_hessian(const ActiveSet& active, System& 
 
 template <class Model>
 ContactProblem<Model>::Tensions ContactProblem<Model>::tensions(const ActiveSet& active) const {
-  Tensions tensions = model_.displacement_slopes();
+  Tensions tensions = Model::kRod ? kept_multipliers_ : model_.displacement_slopes();
   if constexpr (Model::kRod)
     for (int j = 0; j < active.count; ++j)
       if (is_slack(active.contact[j])) tensions[active.contact[j] - contacts()] = active.multiplier[j];

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -111,6 +112,16 @@ class ContactProblem {
   // Evaluates energy, points and gaps, if not done already; false where a control is out of range of the segment law.
   bool evaluate(const Iterate& at);
 
+  // Sets the limit of the tensions; that of the robot until then.
+  void limit_tensions(double limit) { robot_.max_tension = limit; }
+
+  // Lets the motor of a rod's cable keep a tension [N], infinite for one that holds its length instead: the length then
+  // follows the shape, and the cable is a load of the robot and no longer one of its gaps.
+  void keep_tension(int cable, double tension);
+  bool keeps_tension(int cable) const { return kept_tensions_[cable] < HUGE_VAL; }
+  double kept_multiplier(int cable) const { return kept_multipliers_[cable]; }
+  bool keeps_tensions() const { return keeps_tensions_; }  // of any cable
+
   // While `on`, adds a barrier energy to segments that come near to folding over, which no equilibrium of interest does
   // but a descent might.
   void enable_barrier(bool on) {
@@ -202,6 +213,7 @@ class ContactProblem {
   template <class Each>
   void each_load(Each each) const;
   double load_work();
+  double kept_work();
   void add_loads(std::vector<State>& node_forces) const;
   void add_load_curvature(System& system) const;
   void add_barrier(const std::vector<Control>& controls);
@@ -235,6 +247,10 @@ class ContactProblem {
   ActiveSet pressed_;              // these multipliers
   double loaded_ = 1;              // part of the loads that act
   double load_slope_ = 0;          // bound on the slope of their work in a control
+  bool keeps_tensions_ = false;    // whether any motor keeps
+  Tensions kept_tensions_;         // this tension, infinite for those that hold a length, and
+  Tensions kept_multipliers_{};    // the same over the energy scale, 0 for them
+  double kept_slope_ = 0;          // bound on the slope of their work in a control
   bool barrier_enabled_ = false;
   double barrier_energy_ = 0;
   std::vector<Control> barrier_slope_;  // of each segment

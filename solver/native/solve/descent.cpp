@@ -54,6 +54,7 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
     }
     if (held) keep_last_held(descent_start_);
   }
+  if (problem_.keeps_tensions()) follow_lengths(present_.command);
   double farthest = 0;
   for (std::size_t k = 0; k < points_.size(); ++k)
     farthest = std::max(farthest, norm(minus(points_[k], descent_points_[k])));

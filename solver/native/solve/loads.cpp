@@ -1,4 +1,5 @@
-// The loads of a rod: gravity, and dead forces and moments on its disks.
+// The loads of a rod: gravity, dead forces and moments on its disks, and cables whose motors keep their tension.
+#include <algorithm>
 #include <cmath>
 
 #include "model/models.hpp"
@@ -57,8 +58,34 @@ void ContactProblem<Model>::add_load_curvature(System& system) const {
   });
 }
 
+template <class Model>
+void ContactProblem<Model>::keep_tension(int cable, double tension) {
+  kept_tensions_[cable] = tension;
+  kept_multipliers_ = {};
+  kept_slope_ = 0;
+  keeps_tensions_ =
+      std::any_of(kept_tensions_.v.begin(), kept_tensions_.v.end(), [](double t) { return t < HUGE_VAL; });
+  evaluated_ = false;
+}
+
+// The work of motors that keep their tension: the shape takes up from their cables what it likes.
+template <class Model>
+double ContactProblem<Model>::kept_work() {
+  double work = 0;
+  kept_slope_ = 0;
+  for (int k = 0; k < model_.cables().count(); ++k) {
+    if (!keeps_tension(k)) continue;
+    kept_multipliers_[k] = kept_tensions_[k] / energy_scale();
+    work += kept_multipliers_[k] * taken(k);
+    kept_slope_ = std::max(kept_slope_, kept_multipliers_[k] * lever_arm(slack_contact(k)));
+  }
+  return work;
+}
+
 #define CCR_INSTANTIATE(Model)                                                      \
   template double ContactProblem<Model>::load_work();                               \
+  template double ContactProblem<Model>::kept_work();                               \
+  template void ContactProblem<Model>::keep_tension(int, double);                   \
   template void ContactProblem<Model>::add_loads(std::vector<Model::State>&) const; \
   template void ContactProblem<Model>::add_load_curvature(Model::System&) const;
 CCR_INSTANTIATE(PlanarRod)

@@ -21,6 +21,7 @@ struct ModelContinuation<Model>::Pursuit {
   bool holds = false;        // whether obstacles have pressed the cable to its limit, which is not pulled meanwhile
   bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
   double finest = kSmallestStep;  // sub-step before the branch counts as ended
+  bool snapped = false;           // whether the robot has
   Status reached = Status::kConverged;
   bool over = false;  // with `reached`
 };
@@ -100,6 +101,7 @@ void ModelContinuation<Model>::accept() {
   update_trend();
   const double limit = problem_.robot().max_tension;
   if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) keep_last_held(present_);
+  if (problem_.keeps_tensions()) follow_lengths(trial_.command);
   keep_before_contact(trial_);
   std::swap(present_, trial_);
   tensions_ = trial_tensions_;
@@ -118,25 +120,18 @@ void ModelContinuation<Model>::evaluate_present() {
   present_evaluated_ = true;
 }
 
-// The command that is gone for: while anything touches, the cables are not slackened below a pretension, where they
-// alone give the robot its shape.
-template <class Model>
-ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(Command wanted) const {
-  const double pretension = kPretension * problem_.robot().offset;
-  if (Model::kRod || largest_displacement(wanted.cables) >= pretension || !problem_.touches_obstacle(present_.active))
-    return wanted;
-  int taut = 0;
-  for (int k = 1; k < kCables; ++k)
-    if (std::abs(present_.command.cables[k]) > std::abs(present_.command.cables[taut])) taut = k;
-  const double present = present_.command.cables[taut];
-  const double least = std::min(std::abs(present), pretension);
-  if (std::abs(wanted.cables[taut]) < least) wanted.cables[taut] = std::copysign(least, present);
-  return wanted;
-}
-
 template <class Model>
 Status ModelContinuation<Model>::pursue(const Command& target) {
   Pursuit pursuit{.target = target};
+  const Status status = pursue(pursuit);
+  hold_lengths();
+  if (status == Status::kBlocked && pass_with_limit(target)) return Status::kSnapped;
+  if (status != Status::kStalled || command_distance(present_.command, target) > kCommandResolution) return status;
+  return pursuit.snapped ? Status::kSnapped : Status::kConverged;  // what stalled on the way was pulled in after all
+}
+
+template <class Model>
+Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
   newton_.begin_step();
   over_limit_ = {};
   const double limit = problem_.robot().max_tension;
@@ -156,6 +151,7 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
     Command goal = raise_to_pretension(pursuit.wanted);
     if (moves_obstacles(goal)) share_motion(goal, pursuit.holds);
     if (highest(tensions_) > limit) wait_for_motors(goal);
+    if (problem_.keeps_tensions()) leave_kept(goal);
     const double remaining = command_distance(present_.command, goal);
     if (remaining == 0 && resume(pursuit)) continue;
     if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;
@@ -185,7 +181,10 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
                  goal.length == present_.command.length && !moves_obstacles(goal);
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
   const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
-  Move move = stalled ? Move::kOverTension : try_command(next);
+  Move move = Move::kOverTension;
+  if (!stalled)
+    move = problem_.keeps_tensions() ? try_below(ceiling(pursuit.wanted, goal, size / remaining), next)
+                                     : try_command(next);
   if (move == Move::kOverTension && moves_obstacles(next)) {
     if (layout_.cables.size == 1) return give_way(pursuit, next, size);
     move = Move::kAccepted;  // what the motors cannot hold then, they let out
@@ -204,6 +203,7 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     pursuit.refined = true;
   } else if (const Conflict conflict = meet_conflict(next); conflict == Conflict::kTight) {
     stalled = true;
+    over_limit_ = {};
   } else {
     // Cables that no limit stops buckle the robot, farther than roundoff in its energy hides.
     const bool buckles = conflict == Conflict::kBlocked && size < kPatientStep;
@@ -214,12 +214,16 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
       return refine(pursuit, size, stopped || (moves_obstacles(next) && result_.reason == Reason::kStuck));
     }
     stalled = end == End::kOverTension;
-    if (end == End::kSnapped) pursuit.reached = std::max(pursuit.reached, Status::kSnapped);
+    if (end == End::kSnapped) {
+      pursuit.snapped = true;
+      pursuit.reached = std::max(pursuit.reached, Status::kSnapped);
+    }
     step = 2 * (pursuit.finest < kSmallestStep ? size : kSmallestStep);
     pursuit.refined = false;
   }
   if (!stalled) return true;
   pursuit.reached = std::max(pursuit.reached, Status::kStalled);
+  if (stop_holding(pursuit.wanted)) return true;
   if (!hold_stalled_cables(pursuit.wanted) && !resume(pursuit)) return false;
   clear_trend();
   return true;

@@ -1,8 +1,9 @@
 // The continuation compiled for one model. Its files: block_io (blocks read and written), model_continuation (a branch
 // followed), commands (how they compare), trend (how it goes on), rest (where it begins), acceptance (whether a shape
 // continues the branch), passage (whether the robot passed through an obstacle), motion (obstacles that move),
-// tension_limit (stalls and yielding motors), conflict (cables that pull against each other), descent (what happens
-// after the end of a branch), ramp (whether a pull reaches a force).
+// tension_limit (stalls and yielding motors), kept_tension (motors at their limit while others go on), conflict (cables
+// that pull against each other), descent (what happens after the end of a branch), ramp (whether a pull reaches a
+// force).
 #pragma once
 
 #include <array>
@@ -73,6 +74,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
 
   // Following a branch.
   Status pursue(const Command& target);
+  Status pursue(Pursuit& pursuit);
   bool resume(Pursuit& pursuit) const;
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
   bool give_way(Pursuit& pursuit, const Command& next, double size);
@@ -141,6 +143,22 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool find_holding_set(const Command& command, ActiveSet& holding);
   void keep_last_held(const Iterate& held);
 
+  // Motors at the limit that keep their tension.
+  double highest_held(const Tensions& tensions) const;
+  bool stop_holding(const Command& wanted);
+  bool keep_tensions_at_limit(const Tensions& over);
+  bool raise_to_limit(const Command& wanted);
+  bool raise_tension(int cable, double aim, double ceiling);
+  void keep_tension(int cable);
+  void hold_length(int cable);
+  void hold_lengths();
+  bool pass_with_limit(const Command& target);
+  void add_kept_tension(int cable, ActiveSet& active) const;
+  void follow_lengths(Command& command) const;
+  void leave_kept(Command& goal) const;
+  Command ceiling(const Command& wanted, const Command& goal, double part) const;
+  Move try_below(const Command& ceiling, Command command);
+
   // Gaps that no motion satisfies together.
   Conflict meet_conflict(const Command& command);
   int widest_gap(const ActiveSet& conflict) const;
@@ -192,6 +210,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool has_trend_ = false;
   Iterate back_;                   // scratch of `way_back_returns`
   std::vector<Control> unloaded_;  // scratch of `is_blocked`: slope of the energy alone
+  Iterate locked_;                 // where cables lock the robot, to first order
   Iterate descent_start_;          // where a descent began, and its points, mounts and recorded shapes
   std::vector<Position> descent_points_, descent_mounts_;
   std::size_t descent_trace_ = 0;

@@ -11,7 +11,7 @@ using namespace tolerances;
 
 template <class Model>
 bool ModelContinuation<Model>::is_at_tension_limit() const {
-  return highest(tensions_) >= problem_.robot().max_tension * (1 - kTensionBand);
+  return highest_held(tensions_) >= problem_.robot().max_tension * (1 - kTensionBand);
 }
 
 // Whether a tension exceeds by far what the robot needs to bend: geometry begins to block it, ever more closely.
@@ -24,6 +24,8 @@ bool ModelContinuation<Model>::is_tight() const {
 template <class Model>
 void ModelContinuation<Model>::keep_last_held(const Iterate& held) {
   last_held_ = held;
+  for (int k = 0; problem_.keeps_tensions() && k < kCables; ++k)
+    if (problem_.keeps_tension(k)) add_kept_tension(k, last_held_.active);
   was_exceeded_ = true;
 }
 

@@ -1,7 +1,6 @@
 """Cables of the rod in space that pull against each other."""
 
 import math
-from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -83,7 +82,15 @@ def follow(solver, *commands):
     return reduce(solver.step, commands, solver.rest())
 
 
-def test_a_robot_stalls_where_the_tension_jumps_over_the_limit():
+def assert_no_motor_pulls_on(state, command):
+    """Check that every motor holds its command below its limit, or has let its cable follow at the limit."""
+    missed, spare = command - state.cables_mm, 1 - state.tensions / state.robot.max_tension
+    assert missed.min() > -1e-9
+    assert spare.min() >= 0
+    assert np.minimum(missed / state.robot.offset_mm, spare).max() < 2e-6
+
+
+def test_motors_reach_their_limit_where_the_tension_jumps_over_it():
     """Cables that hold a robot tight leave it no way; where others become taut, tensions change without a motion."""
     angles = 5.662756963532212, 1.9606877533948088, 4.734160137367538, 3.3922960372330353, 1.1103390078608542
     robot = SpatialRobot.prototype(
@@ -99,21 +106,16 @@ def test_a_robot_stalls_where_the_tension_jumps_over_the_limit():
     near = -5.40655447, 7.35827771, -7.4264462, -0.52067067, 6.02357317, 4.10324375
     command = -5.406554466591348, 7.3596201982790275, -7.426446198236546, -0.5197058122344402
     command += 6.024511040758811, 4.103792845397489
-    solver, stronger = (SpatialSolver(replace(robot, max_tension=limit), Scene()) for limit in (100.0, 130.0))
+    solver = SpatialSolver(robot, Scene())
     stalled = follow(solver, start, near, command)
     again = solver.step(stalled, command)
     assert stalled.status is again.status is Status.STALLED
     assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-6)
-    assert stalled.tensions.max() == pytest.approx(98.373, abs=1e-3)
-    farther = stalled.cables_mm + 1e-4 * (np.array(command) - stalled.cables_mm)
-    on = follow(stronger, start, near, farther)
-    assert on.cables_mm == pytest.approx(farther, abs=1e-9)
-    assert on.nodes == pytest.approx(stalled.nodes, abs=2e-3)
-    assert on.tensions.max() == pytest.approx(106.763, abs=1e-3)
+    assert_no_motor_pulls_on(stalled, command)
 
 
 def test_no_motor_pulls_across_a_jump_of_the_tension():
-    """A sub-step so close to the jump that it pulls no cable in, but for rounding, is not one that only lets out."""
+    """Cables all around lock a robot that one of them, twice there, would still bend: all motors go to their limit."""
     robot = SpatialRobot.prototype(
         model="rod",
         segments=18,
@@ -123,14 +125,12 @@ def test_no_motor_pulls_across_a_jump_of_the_tension():
     )
     command = np.array([-2.6523284174233144, -2.69361358272645, 2.582094007069561])
     command = np.append(command, [2.7144816961851554, -2.4466038268875936])
-    solver, stronger = (SpatialSolver(replace(robot, max_tension=limit), Scene()) for limit in (15.0, 1000.0))
+    solver = SpatialSolver(robot, Scene())
     stalled = follow(solver, command)
     again = solver.step(stalled, command)
     assert stalled.status is again.status is Status.STALLED
-    assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=0.05)  # other motors yield a little at the jump
-    farther = follow(stronger, stalled.cables_mm + 1e-4 * (command - stalled.cables_mm))
-    assert (stalled.tensions.max(), again.tensions.max()) == pytest.approx((1.167, 1.169), rel=1e-3)
-    assert farther.tensions.max() == pytest.approx(300, rel=1e-3)
+    assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-6)
+    assert_no_motor_pulls_on(stalled, command)
 
 
 def test_a_robot_snaps_to_rest_while_a_motor_lets_its_cable_out():

@@ -1,0 +1,232 @@
+// Motors of a rod at their limit while others go on: they cannot hold, but keep their tension. The length of the cable
+// follows, so that it is let out, or pulled in as far as commanded: 0 <= command - length ⟂ limit - tension >= 0.
+#include <algorithm>
+#include <cmath>
+
+#include "model/models.hpp"
+#include "solve/model_continuation.hpp"
+
+namespace ccr {
+
+using namespace tolerances;
+
+// The highest tension of a cable that is held at a length.
+template <class Model>
+double ModelContinuation<Model>::highest_held(const Tensions& tensions) const {
+  if (!problem_.keeps_tensions()) return highest(tensions);
+  double tension = -HUGE_VAL;
+  for (int k = 0; k < kCables; ++k)
+    if (!problem_.keeps_tension(k)) tension = std::max(tension, tensions[k]);
+  return tension;
+}
+
+// Where pulling on leads beyond the limit: lets the motors keep their tension that are at the limit then, or else
+// raises it to there, or else all that are at the limit. False where there are none but those that do, or one cable.
+template <class Model>
+bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
+  if constexpr (Model::kRod) {
+    if (layout_.cables.size == 1) return false;
+    evaluate_present();
+    if (highest_held(tensions_) > problem_.robot().max_tension) return false;
+    if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted)) return true;
+    Tensions all;
+    all.v.fill(HUGE_VAL);
+    return keep_tensions_at_limit(all);
+  }
+  return false;
+}
+
+// Lets the motors at the limit keep their tension, among those that some tensions exceed it of.
+template <class Model>
+bool ModelContinuation<Model>::keep_tensions_at_limit(const Tensions& over) {
+  const double limit = problem_.robot().max_tension;
+  bool kept = false;
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
+    if (problem_.keeps_tension(k) || over[k] <= limit || tensions_[k] < limit * (1 - kTensionBand)) continue;
+    keep_tension(k);
+    kept = true;
+  }
+  if (kept) clear_trend();
+  return kept;
+}
+
+// Where the tensions of cables that are pulled jump over the limit within the smallest sub-step, as where others become
+// taut: raises them to the limit. False where that leads nowhere.
+template <class Model>
+bool ModelContinuation<Model>::raise_to_limit(const Command& wanted) {
+  const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
+  bool raised = false;
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
+    if (problem_.keeps_tension(k) || over_limit_[k] <= limit || !pulls_in(wanted, k)) continue;
+    raised |= raise_tension(k, aim, wanted.cables[k]);
+  }
+  return raised;
+}
+
+// Raises the tension of one cable, whose length follows, up to an aim, and lets its motor keep it. False where its
+// ceiling or the limit of another comes first: it is held there.
+template <class Model>
+bool ModelContinuation<Model>::raise_tension(int cable, double aim, double ceiling) {
+  const double limit = problem_.robot().max_tension;
+  keep_tension(cable);
+  double rise = aim - tensions_[cable];
+  for (int i = 0; i < kStallIterations && tensions_[cable] < aim; ++i) {
+    const double tension = std::min(aim, tensions_[cable] + rise);
+    problem_.keep_tension(cable, tension);
+    const Command here = present_.command;
+    const bool follows = try_command(here) == Move::kAccepted && problem_.taken(cable) <= ceiling &&
+                         highest_held(trial_tensions_) <= limit;
+    if (follows) {
+      accept();
+      clear_trend();
+      rise *= 2;
+      continue;
+    }
+    present_evaluated_ = false;
+    problem_.keep_tension(cable, tensions_[cable]);
+    rise /= 4;
+  }
+  const bool raised = tensions_[cable] >= aim;
+  if (!raised) hold_length(cable);
+  return raised;
+}
+
+// Lets a motor keep its tension at `present_`, to which the cable is then a load.
+template <class Model>
+void ModelContinuation<Model>::keep_tension(int cable) {
+  if constexpr (Model::kRod) {
+    constexpr double kRounding = 1e-15;  // of the multiplier, which must not lead beyond the limit
+    problem_.keep_tension(cable, std::min(tensions_[cable], problem_.robot().max_tension * (1 - kRounding)));
+    ActiveSet& active = present_.active;
+    for (int j = 0; j < active.count; ++j)
+      if (active.contact[j] == problem_.slack_contact(cable)) active.drop(j--);
+    present_evaluated_ = false;
+    evaluate_present();
+  }
+}
+
+// Lets a motor that keeps its tension hold its cable at the length of `present_` instead.
+template <class Model>
+void ModelContinuation<Model>::hold_length(int cable) {
+  if constexpr (Model::kRod) {
+    evaluate_present();
+    add_kept_tension(cable, present_.active);
+    problem_.keep_tension(cable, HUGE_VAL);
+    present_evaluated_ = false;
+    evaluate_present();
+    clear_trend();
+  }
+}
+
+template <class Model>
+void ModelContinuation<Model>::hold_lengths() {
+  for (int k = 0; problem_.keeps_tensions(); ++k)
+    if (problem_.keeps_tension(k)) hold_length(k);
+}
+
+// Adds a cable whose motor keeps its tension to an active set: first, as those of a block are.
+template <class Model>
+void ModelContinuation<Model>::add_kept_tension(int cable, ActiveSet& active) const {
+  active.count = std::min(active.count + 1, kMaxActive);
+  std::copy_backward(active.contact.begin(), active.contact.begin() + active.count - 1,
+                     active.contact.begin() + active.count);
+  std::copy_backward(active.multiplier.begin(), active.multiplier.begin() + active.count - 1,
+                     active.multiplier.begin() + active.count);
+  active.contact[0] = problem_.slack_contact(cable);
+  active.multiplier[0] = problem_.kept_multiplier(cable);
+}
+
+// Writes the lengths to which cables have followed the shape at which the problem is evaluated.
+template <class Model>
+void ModelContinuation<Model>::follow_lengths(Command& command) const {
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (problem_.keeps_tension(k)) command.cables[k] = problem_.taken(k);
+}
+
+// Leaves cables out of a goal whose motors keep their tension, unless it lets them out.
+template <class Model>
+void ModelContinuation<Model>::leave_kept(Command& goal) const {
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (problem_.keeps_tension(k)) goal.cables[k] = std::min(goal.cables[k], present_.command.cables[k]);
+}
+
+// How far cables may be pulled in part of the way to a goal.
+template <class Model>
+ModelContinuation<Model>::Command ModelContinuation<Model>::ceiling(const Command& wanted, const Command& goal,
+                                                                    double part) const {
+  Command highest = between(present_.command, goal, part);
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (wanted.cables[k] >= present_.command.cables[k]) highest.cables[k] = wanted.cables[k];
+  return highest;
+}
+
+// Tries a command among motors that keep their tension, none of which pulls its cable farther in than to a ceiling:
+// what would go beyond is held there.
+template <class Model>
+ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command& ceiling, Command command) {
+  const double resolution = kCommandResolution * problem_.robot().offset;
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (problem_.keeps_tension(k)) command.cables[k] = present_.command.cables[k];
+  std::array<int, kMaxCables> stopped;
+  int count = 0;
+  for (Move move = try_command(command);; move = try_command(command)) {
+    int beyond = -1;
+    for (int k = 0; k < static_cast<int>(layout_.cables.size) && move == Move::kAccepted; ++k) {
+      if (!problem_.keeps_tension(k)) continue;
+      if (problem_.taken(k) < problem_.robot().rod.least_pull) move = Move::kRejected;  // it has no more to let out
+      if (problem_.taken(k) > ceiling.cables[k] + resolution) beyond = k;
+    }
+    if (move == Move::kAccepted && beyond < 0) return move;
+    if (move != Move::kAccepted) {  // those that were stopped keep their tension in a shorter sub-step
+      const bool jumps = move == Move::kOverTension && command_distance(present_.command, command) <= kSmallestStep;
+      for (int j = 0; j < count && !jumps; ++j) keep_tension(stopped[j]);
+      return count > 0 && !jumps ? Move::kRejected : move;
+    }
+    stopped[count++] = beyond;
+    hold_length(beyond);
+    command.cables[beyond] = ceiling.cables[beyond];
+  }
+}
+
+// Where cables that no limit stops lock a robot that touches nothing, to first order: takes it to the command past
+// their balance, with motors of growing strength that let their cables follow meanwhile. False where it is not reached
+// before geometry blocks the robot.
+template <class Model>
+bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
+  const Robot& robot = problem_.robot();
+  if (!Model::kRod || layout_.cables.size == 1 || std::isfinite(robot.max_tension)) return false;
+  if (problem_.touches_obstacle(present_.active) || moves_obstacles(target)) return false;
+  const double unit = robot.rigidity / (robot.offset * robot.max_length);
+  locked_ = present_;
+  bool reached = false;
+  for (double limit = kFirstLimit * unit; !reached && limit < kTight * unit && !work_is_spent(); limit *= 2) {
+    evaluate_present();
+    if (highest(tensions_) > limit) continue;
+    problem_.limit_tensions(limit);
+    pursue(target);
+    reached = command_distance(present_.command, target) <= kCommandResolution;
+  }
+  problem_.limit_tensions(HUGE_VAL);
+  if (!reached) present_ = locked_;
+  present_evaluated_ = false;
+  evaluate_present();
+  if (!reached) record_shape();
+  return reached;
+}
+
+#define CCR_INSTANTIATE(Model)                                                                                         \
+  template double ModelContinuation<Model>::highest_held(const Tensions&) const;                                       \
+  template bool ModelContinuation<Model>::stop_holding(const Command&);                                                \
+  template void ModelContinuation<Model>::hold_length(int);                                                            \
+  template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
+  template void ModelContinuation<Model>::hold_lengths();                                                              \
+  template void ModelContinuation<Model>::add_kept_tension(int, ActiveSet&) const;                                     \
+  template void ModelContinuation<Model>::follow_lengths(Command&) const;                                              \
+  template void ModelContinuation<Model>::leave_kept(Command&) const;                                                  \
+  template ModelContinuation<Model>::Command ModelContinuation<Model>::ceiling(const Command&, const Command&, double) \
+      const;                                                                                                           \
+  template ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command&, Command);
+CCR_EACH_MODEL(CCR_INSTANTIATE)
+#undef CCR_INSTANTIATE
+
+}  // namespace ccr

@@ -1,0 +1,117 @@
+"""Motors of several cables at their limit: each holds its command, or keeps its limit while its cable follows."""
+
+import math
+
+import numpy as np
+import pytest
+
+from solver import Cable, Circle, Robot, Scene, Solver, Status
+from solver.spatial import SpatialRobot, SpatialSolver
+
+CIRCLE = Scene([Circle(center=(44, 104), radius=15)])
+SAME_SIDE = Solver(Robot.prototype(between=1, cables=(Cable(), Cable(offset_mm=4, end=9))), CIRCLE)
+SECTIONS = SpatialSolver(SpatialRobot.preset("rao_2021"), Scene())
+SNAKE = SpatialSolver(SpatialRobot.preset("snake_arm"), Scene())
+CASES = [
+    (SAME_SIDE, (6.0, 3.5)),
+    (Solver(Robot.preset("rao_2021"), Scene()), (6.0, -6.0, 1.0, 1.0)),
+    (SECTIONS, (6.0, -6.0, -6.0, 1.0, 1.0, 1.0)),
+    (SNAKE, (20.0, -5.0, -25.0, -5.0, 5.0, -5.0, 5.0, -5.0)),
+]
+
+
+def follow(solver, command, steps):
+    """Return the state after a command in even steps from rest."""
+    state = solver.rest()
+    for part in np.linspace(0, 1, steps + 1)[1:]:
+        state = solver.step(state, tuple(part * np.array(command)))
+    return state
+
+
+def worst_motor(state, command):
+    """Return how far any motor is both short of its command, over the offset, and below its limit, as a fraction."""
+    missed, spare = command - state.cables_mm, 1 - state.tensions / state.robot.max_tension
+    assert missed.min() > -1e-9
+    assert spare.min() >= 0
+    return np.minimum(missed / state.robot.offset_mm, spare).max()
+
+
+@pytest.mark.parametrize(("solver", "command"), CASES)
+def test_where_motors_stall_does_not_depend_on_the_size_of_steps(solver, command):
+    once, often = (follow(solver, command, steps) for steps in (1, 100))
+    assert once.status is often.status is Status.STALLED
+    assert often.cables_mm == pytest.approx(once.cables_mm, abs=1e-5 * solver.robot.offset_mm)
+    assert often.nodes == pytest.approx(once.nodes, abs=1e-5 * solver.robot.length_mm)
+    for state in (once, often):
+        assert worst_motor(state, command) < 2e-6
+        assert max(solver.optimality(state)) < 1e-9
+
+
+@pytest.mark.parametrize(("solver", "command"), CASES)
+def test_a_stalled_command_that_is_repeated_leads_no_farther(solver, command):
+    state = follow(solver, command, 10)
+    again = state
+    for _ in range(5):
+        again = solver.step(again, command)
+    assert again.status is Status.STALLED
+    assert again.cables_mm == pytest.approx(state.cables_mm, abs=1e-6 * solver.robot.offset_mm)
+
+
+def test_a_motor_at_its_limit_lets_its_cable_out_while_another_pulls():
+    stalled = follow(SAME_SIDE, (4.0, 3.5), 1)
+    pulled = SAME_SIDE.step(stalled, (6.0, stalled.cables_mm[1]))
+    assert stalled.tensions[1] == pytest.approx(15, rel=1e-6)
+    assert pulled.cables_mm[0] == pytest.approx(6.0)
+    assert pulled.tensions[1] <= 15
+    assert worst_motor(pulled, np.array([6.0, stalled.cables_mm[1]])) < 2e-6
+
+
+def test_two_cables_of_one_direction_yield_to_the_weight_at_rest():
+    cables = Cable(offset_mm=2.2), Cable(offset_mm=2.9)
+    robot = SpatialRobot.prototype(model="rod", cables=cables, weight_per_length=(-0.02, 0, 0))
+    solver = SpatialSolver(robot, Scene())
+    rest = solver.rest()
+    assert rest.status is Status.STALLED
+    assert worst_motor(rest, np.zeros(2)) < 2e-6
+    assert max(solver.optimality(rest)) < 1e-9
+    assert solver.step(rest, (0.0, 0.0)).cables_mm == pytest.approx(rest.cables_mm, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_motor_of_a_random_robot_stops_below_its_limit(seed):
+    generator = np.random.default_rng(seed)
+    cables = tuple(
+        Cable(angle=float(generator.uniform(0, 2 * math.pi)), end=int(generator.choice([9, 18])))
+        for _ in range(generator.integers(2, 7))
+    )
+    robot = SpatialRobot.prototype(model="rod", cables=cables, max_tension=float(generator.choice([4.0, 15.0])))
+    solver = SpatialSolver(robot, Scene())
+    command = generator.normal(0, 4, len(cables))
+    once, often = (follow(solver, command, steps) for steps in (1, 20))
+    for state in (once, often):
+        assert state.status <= Status.STALLED
+        assert worst_motor(state, command) < 2e-6
+        assert (state.status is Status.STALLED) == (np.max(command - state.cables_mm) > 1e-9)
+    assert often.nodes == pytest.approx(once.nodes, abs=1e-4 * robot.length_mm)
+
+
+def test_cables_that_lock_a_straight_robot_to_first_order_do_not_block_it():
+    """Three of the cables surround the backbone; what one of them lets out lets the others bend the robot."""
+    cables = (
+        Cable(angle=3.8658719, offset_mm=5.3210395),
+        Cable(angle=4.9840911, offset_mm=7.5964209),
+        Cable(angle=0.8266089, offset_mm=5.4431837, end=4),
+        Cable(angle=0.9217387, offset_mm=4.9405651),
+    )
+    command = (0.278, -11.632, -13.399, 2.126)
+    ends = []
+    for limit in (30.0, math.inf):
+        robot = SpatialRobot(
+            length_mm=180, segments=8, offset_mm=7.753542, cables=cables, max_tension=limit, torsion_ratio=0.95054
+        )
+        solver = SpatialSolver(robot, Scene())
+        ends.append(solver.step(solver.rest(), command))
+        assert ends[-1].status <= Status.SNAPPED
+        assert ends[-1].cables_mm == pytest.approx(command)
+        assert max(solver.optimality(ends[-1])) < 1e-9
+    assert ends[1].nodes == pytest.approx(ends[0].nodes, abs=1e-6)
