@@ -37,7 +37,7 @@ inline constexpr double kReach = 0.0225;
 
 // Active set.
 inline constexpr int kMaxObstacles = 32;
-inline constexpr int kMaxActive = 32;
+inline constexpr int kMaxActive = 64;
 inline constexpr int kActiveSetChanges = 96;
 inline constexpr double kDependent =
     1e-12;  // relative curvature below which a gap is linearly dependent on the active ones

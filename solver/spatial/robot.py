@@ -242,7 +242,7 @@ class SpatialRobot:
 
     @property
     def bounded_twist(self) -> float:
-        """Twist of a segment of the rod that ``edges_mm`` allows for [rad]: 0.45 l0 / a more than the largest at rest."""
+        """Twist of a rod's segment that ``edges_mm`` allows for [rad]: 0.45 l0 / a more than the largest at rest."""
         at_rest = np.abs(np.reshape(self.precurvature, (-1, 3))[:, 2]).max()
         return float(TWIST_SLOPE * self.segment_mm / self.offset_mm + at_rest)
 
