@@ -114,7 +114,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // Whether a shape continues the branch.
   bool try_free_shape();
   bool bend_freely();
-  bool meets_narrow_obstacle() const;
+  bool meets_another_side() const;
+  bool was_faced(int contact) const;
   double energy_loss(const Command& command) const;
   bool left_branch(const Command& command, double moved, double loss);
   bool follows_trend() const;
