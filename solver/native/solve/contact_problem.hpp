@@ -27,8 +27,10 @@ struct ActiveSet {
   ActiveSet(const ActiveSet& other) { *this = other; }
   ActiveSet& operator=(const ActiveSet& other) {
     count = other.count;
-    std::copy_n(other.contact.begin(), count, contact.begin());
-    std::copy_n(other.multiplier.begin(), count, multiplier.begin());
+    for (int j = 0; j < count; ++j) {  // most often one or two
+      contact[j] = other.contact[j];
+      multiplier[j] = other.multiplier[j];
+    }
     return *this;
   }
 
