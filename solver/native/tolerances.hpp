@@ -38,6 +38,7 @@ inline constexpr double kReach = 0.0225;
 // Active set.
 inline constexpr int kMaxObstacles = 32;
 inline constexpr int kMaxActive = 64;  // a robot of 18 segments presses against a narrow channel at more than 32 points
+inline constexpr int kMaxTrend = 32;   // with more active gaps, no trend of theirs is kept
 inline constexpr int kActiveSetChanges = 96;
 inline constexpr double kDependent =
     1e-12;  // relative curvature below which a gap is linearly dependent on the active ones

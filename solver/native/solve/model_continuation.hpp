@@ -22,7 +22,7 @@ template <class Model>
 struct Trend {
   std::vector<typename Model::Control> controls;
   std::vector<Position<Model::kSpace>> mounts;
-  std::array<double, tolerances::kMaxActive> multipliers{};  // in the order of the active set
+  std::array<double, tolerances::kMaxTrend> multipliers{};  // in the order of the active set
 };
 
 template <class Model>
