@@ -1,5 +1,6 @@
 """Obstacles and rods as the kernel takes them."""
 
+import math
 from typing import TypedDict
 
 import numpy as np
@@ -56,13 +57,14 @@ def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> 
     )
 
 
-def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray) -> _kernel.Rod:
+def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray, bounded_twist: float = math.inf) -> _kernel.Rod:
     """Return what the kernel needs to know of a rod.
 
     Args:
         robot: The robot.
         stiffness: EI, in space also GJ, of each segment over the robot's rigidity, ``(n,)`` or ``(n, 3)``.
         rest: Angles of each segment at rest, likewise [rad].
+        bounded_twist: Twist of a segment in space up to which no edge is too long [rad].
     """
     cables, weight = full_cables(robot), (*robot.weight_per_length, 0.0)[:3]
     loads = [
@@ -77,4 +79,5 @@ def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray) -> _kerne
         weight=weight,
         loads=loads,
         least_pull=least_cable_mm(robot),
+        bounded_twist=bounded_twist,
     )

@@ -161,9 +161,12 @@ void bind_robot(nb::module_& m) {
       .def(
           "__init__",
           [](Rod* self, const std::vector<Numbers<2>>& holes, const std::vector<int>& ends, const Input& stiffness,
-             const Input& rest, const Numbers<3>& weight, const std::vector<Load>& loads,
-             double least_pull) { new (self) Rod(make_rod(holes, ends, stiffness, rest, weight, loads, least_pull)); },
-          nb::kw_only(), "holes"_a, "ends"_a, "stiffness"_a, "rest"_a, "weight"_a, "loads"_a, "least_pull"_a);
+             const Input& rest, const Numbers<3>& weight, const std::vector<Load>& loads, double least_pull,
+             double bounded_twist) {
+            new (self) Rod(make_rod(holes, ends, stiffness, rest, weight, loads, least_pull, bounded_twist));
+          },
+          nb::kw_only(), "holes"_a, "ends"_a, "stiffness"_a, "rest"_a, "weight"_a, "loads"_a, "least_pull"_a,
+          "bounded_twist"_a);
   nb::class_<Robot>(m, "Robot", "A robot.")
       .def(
           "__init__",

@@ -43,7 +43,8 @@ inline void require(bool condition, const std::string& message) {
 }
 
 inline Rod make_rod(const std::vector<Numbers<2>>& holes, const std::vector<int>& ends, const Input& stiffness,
-                    const Input& rest, const Numbers<3>& weight, std::vector<Load> loads, double least_pull) {
+                    const Input& rest, const Numbers<3>& weight, std::vector<Load> loads, double least_pull,
+                    double bounded_twist) {
   require(holes.size() == ends.size() && holes.size() <= kMaxCables,
           "holes and ends must name the same cables, at most " + std::to_string(kMaxCables));
   Rod rod{.cables = {},
@@ -51,7 +52,8 @@ inline Rod make_rod(const std::vector<Numbers<2>>& holes, const std::vector<int>
           .rest = {rest.data(), rest.data() + rest.size()},
           .weight = {weight},
           .loads = std::move(loads),
-          .least_pull = least_pull};
+          .least_pull = least_pull,
+          .bounded_twist = bounded_twist};
   for (std::size_t k = 0; k < holes.size(); ++k) rod.cables.push_back({{holes[k]}, ends[k]});
   return rod;
 }

@@ -37,7 +37,8 @@ inline constexpr double kReach = 0.0225;
 
 // Active set.
 inline constexpr int kMaxObstacles = 32;
-inline constexpr int kMaxActive = 32;
+inline constexpr int kMaxActive = 64;  // a robot of 18 segments presses against a narrow channel at more than 32 points
+inline constexpr int kMaxTrend = 32;   // with more active gaps, no trend of theirs is kept
 inline constexpr int kActiveSetChanges = 96;
 inline constexpr double kDependent =
     1e-12;  // relative curvature below which a gap is linearly dependent on the active ones
@@ -55,12 +56,15 @@ inline constexpr int kPenaltyWork = 1200;    // factorisations of a step, after 
 inline constexpr double kNormDamping = 1.0;  // of the norm that measures closeness of shapes
 
 // Continuation.
-inline constexpr double kPretension = 0.00625;    // a robot in contact is not slackened below this displacement [a]
-inline constexpr double kInsertion = 11.25;       // displacement that counts as much as an insertion by L [a]
-inline constexpr double kMotion = 11.25;          // displacement that counts as much as a motion of obstacles by L [a]
-inline constexpr double kLoading = 2.0;           // displacement that counts as much as raising all loads [a]
-inline constexpr double kLargestStep = 0.09375;   // sub-step [a]
-inline constexpr double kMeetingStep = 0.01;      // sub-step in which a narrow obstacle may be met [a]
+inline constexpr double kPretension = 0.00625;   // a robot in contact is not slackened below this displacement [a]
+inline constexpr double kInsertion = 11.25;      // displacement that counts as much as an insertion by L [a]
+inline constexpr double kMotion = 11.25;         // displacement that counts as much as a motion of obstacles by L [a]
+inline constexpr double kLoading = 2.0;          // displacement that counts as much as raising all loads [a]
+inline constexpr double kLargestStep = 0.09375;  // sub-step [a]
+inline constexpr double kMeetingStep =
+    0.01;  // sub-step in which a narrow obstacle may be met, or the side of one that a point did not face [a]
+inline constexpr double kFacing =
+    0.7;  // cosine of the angle between the normals of the side that it faced and this one
 inline constexpr double kSmallestStep = 1.25e-5;  // sub-step before a branch counts as ended [a]
 inline constexpr double kPatientStep =
     1e-4;  // sub-step up to which Newton's method may begin with damped iterations [a]

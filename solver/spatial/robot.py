@@ -23,6 +23,7 @@ from solver.common.validation import check_finite, check_number, check_sequence,
 
 LINES = ("backbone", "holes", "rim")
 TORSIONS = (0.01, 100.0)  # GJ over EI
+TWIST_SLOPE = 0.45  # of a line at the distance a against the backbone, which the longest edges allow for
 LEAST_SINE = math.sin(math.radians(30) - 1e-9)  # of the angle between the cables
 
 
@@ -234,9 +235,16 @@ class SpatialRobot:
         """Largest possible distance between neighbouring points of each line [mm].
 
         A segment of the paper's model shears at most up to where its cable has no more length to give; one of the rod
-        bends and twists at most up to where its disks meet.
+        bends at most up to where its disks meet. It may bend so far while it twists by up to :attr:`bounded_twist`; a
+        shape in which more twist makes an edge longer is out of the solver's range.
         """
         return _longest_edges(self)
+
+    @property
+    def bounded_twist(self) -> float:
+        """Twist of a rod's segment that ``edges_mm`` allows for [rad]: 0.45 l0 / a more than the largest at rest."""
+        at_rest = np.abs(np.reshape(self.precurvature, (-1, 3))[:, 2]).max()
+        return float(TWIST_SLOPE * self.segment_mm / self.offset_mm + at_rest)
 
     @property
     def energy_scale(self) -> float:
@@ -263,8 +271,9 @@ def _longest_edges(robot: SpatialRobot) -> tuple[float, ...]:
     if robot.model == "rod":
         reaches = np.linalg.norm(robot.lines_mm, axis=1)
         widest = widest_bend(segment, robot.edge_mm, robot.disk_thickness_mm)
-        longest = [longest_arc_edge(segment, reach, widest) for reach in reaches]
-        return tuple(max(segment, length) / (robot.between + 1) for length in longest)
+        along = [max(segment, longest_arc_edge(segment, reach, widest)) for reach in reaches]
+        across = 2 * reaches * math.sin(min(robot.bounded_twist, math.pi) / 2)
+        return tuple((np.hypot(along, across) / (robot.between + 1)).tolist())
     turned = math.sqrt(segment**2 - (segment - robot.cable_limit_mm / robot.segments) ** 2)
     stretched = np.abs(robot.line_weights).sum(axis=1) * turned
     return tuple(((segment + stretched) / (robot.between + 1)).tolist())

@@ -153,7 +153,8 @@ def kernel_robot(robot: SpatialRobot) -> _kernel.Robot:
 
 
 def _kernel_rod(robot: SpatialRobot) -> _kernel.Rod:
-    return kernel_rod(robot, stiffness_ratios(robot), np.broadcast_to(robot.precurvature, (robot.segments, 3)))
+    at_rest = np.broadcast_to(robot.precurvature, (robot.segments, 3))
+    return kernel_rod(robot, stiffness_ratios(robot), at_rest, robot.bounded_twist)
 
 
 def kernel_scene(robot: SpatialRobot, scene: Scene) -> list[_kernel.SpatialObstacle]:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "math/rotations.hpp"
@@ -34,7 +35,8 @@ struct Rod {
   std::vector<double> rest;       // controls of each segment at rest: its precurvature [rad]
   Vec<3> weight{};                // of a unit of length, in the base frame [N/mm]
   std::vector<Load> loads;
-  double least_pull = 0;  // of a cable [mm]
+  double least_pull = 0;            // of a cable [mm]
+  double bounded_twist = HUGE_VAL;  // of a segment in space, up to which no edge is too long [rad]
 };
 
 struct Robot {

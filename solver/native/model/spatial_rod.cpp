@@ -53,7 +53,8 @@ bool SpatialRod::evaluate(const Command& command, const std::vector<Control>& co
   for (int i = 0; i < n; ++i) chords_[i] = move_up(arcs_[i], states[i], frames[i], states[i + 1], frames[i + 1]);
   add_strain(controls);
   take_up_cables(alike);
-  return std::isfinite(objective) && widest <= tolerances::kWidestTurn;
+  return std::isfinite(objective) && widest <= tolerances::kWidestTurn &&
+         (widest <= robot_.rod.bounded_twist || keeps_edges(controls));
 }
 
 void SpatialRod::add_strain(const std::vector<Control>& controls) {
@@ -71,6 +72,23 @@ void SpatialRod::add_strain(const std::vector<Control>& controls) {
   objective = energy;
   max_objective_slope = largest;
   widest = std::sqrt(square);
+}
+
+// Whether no segment twists so far while it bends that an edge beside it is longer than the longest. In the frame
+// halfway, a line at the distance r runs along c + g b r and across g τ r at most.
+bool SpatialRod::keeps_edges(const std::vector<Control>& controls) const {
+  const auto sinc = [](double half) { return half > 0 ? std::sin(half) / half : 1.0; };
+  for (const Control& control : controls) {
+    const double twist = std::abs(control[2]);
+    if (twist <= robot_.rod.bounded_twist) continue;
+    const double bent = std::hypot(control[0], control[1]);
+    const double chord = length_ * sinc(bent / 2), spread = sinc(std::hypot(bent, twist) / 2);
+    for (std::size_t line = 0; line < robot_.lines.size(); ++line) {
+      const double beside = spread * norm(robot_.lines[line]), longest = robot_.edges[line] * (robot_.between + 1);
+      if (std::hypot(chord + beside * bent, beside * twist) > longest) return false;
+    }
+  }
+  return true;
 }
 
 void SpatialRod::take_up_cables(bool alike) {

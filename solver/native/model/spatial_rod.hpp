@@ -74,6 +74,7 @@ class SpatialRod {
 
  private:
   void add_strain(const std::vector<Control>& controls);
+  bool keeps_edges(const std::vector<Control>& controls) const;
   void take_up_cables(bool alike);
 
   Robot robot_;

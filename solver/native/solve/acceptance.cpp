@@ -34,7 +34,7 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   }
   const double moved = largest_motion();
   const bool contact = problem_.touches_obstacle(trial_.active) || problem_.touches_obstacle(present_.active);
-  if (distance > kMeetingStep && meets_narrow_obstacle()) return Move::kRejected;
+  if (distance > kMeetingStep && meets_another_side()) return Move::kRejected;
   const double allowed = contact ? std::min(kMoveOffset + kMoveSlope * distance, kMoveLargest) : kMoveLargest;
   if (moved > problem_.robot().max_length * allowed || !passage_is_clear(moved)) return Move::kRejected;
   problem_.reduced_gradient(trial_.active);
@@ -53,18 +53,30 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   return peaks && distance > kPeakStep ? Move::kRejected : Move::kAccepted;
 }
 
-// Whether a contact came in with an obstacle that is narrower than the distance of neighbouring points: which point
-// meets it first decides where the robot goes.
+// Whether a contact came in whose place the size of the sub-step may have decided: with an obstacle that is narrower
+// than the distance of neighbouring points, or with one that has an edge, behind which the point was before.
 template <class Model>
-bool ModelContinuation<Model>::meets_narrow_obstacle() const {
+bool ModelContinuation<Model>::meets_another_side() const {
   const std::vector<double>& edges = problem_.robot().edges;
   const double spacing = *std::min_element(edges.begin(), edges.end());
   const ActiveSet &before = present_.active, &now = trial_.active;
   const auto begin = before.contact.begin(), end = begin + before.count;
   return std::any_of(now.contact.begin(), now.contact.begin() + now.count, [&](int contact) {
-    return contact < problem_.contacts() && problem_.obstacles()[contact / points_.size()].inradius < spacing &&
-           std::find(begin, end, contact) == end;
+    if (contact >= problem_.contacts() || std::find(begin, end, contact) != end) return false;
+    const auto& obstacle = problem_.obstacles()[contact / points_.size()];
+    return obstacle.inradius < spacing || (obstacle.min_curvature_radius < spacing && !was_faced(contact));
   });
+}
+
+// Whether a point that touches now was before the side of the obstacle that it touches, and not before another one,
+// round an edge.
+template <class Model>
+bool ModelContinuation<Model>::was_faced(int contact) const {
+  const int j = contact / static_cast<int>(points_.size()), mount = problem_.mount_of(j);
+  Position place = minus(points_[contact % points_.size()], mount < 0 ? Position{} : mounts_[mount]);
+  place = minus(place, problem_.displacement(j, trial_.command.scene, present_.command.scene));
+  const Position faced = measure_gap(problem_.obstacles()[j], place).slope, now = problem_.gap(contact).slope;
+  return dot(faced, now) >= kFacing * norm(faced) * norm(now);
 }
 
 // Work of the cables from `present_` to `trial_`, at tensions that change linearly, less the gain in energy [rad²].

@@ -158,7 +158,8 @@ void ModelContinuation<Model>::write_trend(double* block) const {
   for (const Control& control : trend_.controls) controls = write(control.v, controls);
   write_mounts(trend_.mounts, block + layout_.trend_displacements.offset);
   double* multipliers = block + layout_.trend_multipliers.offset;
-  std::fill_n(multipliers, kMaxActive, 0.0);
+  std::fill_n(multipliers, kMaxTrend, 0.0);
+  if (active.count > kMaxTrend) return;
   const auto begin = active.contact.begin(), end = begin + active.count;
   for (int j = 0; j < active.count; ++j) {
     const auto rank = std::count_if(begin, end, [&](int contact) { return contact < begin[j]; });

@@ -55,7 +55,7 @@ BlockLayout make_block_layout(const BlockCounts& counts) {
   append(out, out.disk_multipliers, {Model::kRod ? n : 0});
   append(out, out.trend_coordinates, each(trend ? n : 0, {Model::kControl}));
   append(out, out.trend_displacements, {trend ? obstacles : 0, space});
-  append(out, out.trend_multipliers, {trend ? tolerances::kMaxActive : 0});
+  append(out, out.trend_multipliers, {trend ? tolerances::kMaxTrend : 0});
   return out;
 }
 

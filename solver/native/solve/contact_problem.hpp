@@ -23,6 +23,18 @@ struct ActiveSet {
   std::array<int, tolerances::kMaxActive> contact;
   std::array<double, tolerances::kMaxActive> multiplier;
 
+  // Copies only what is in use.
+  ActiveSet() = default;
+  ActiveSet(const ActiveSet& other) { *this = other; }
+  ActiveSet& operator=(const ActiveSet& other) {
+    count = other.count;
+    for (int j = 0; j < count; ++j) {  // most often one or two
+      contact[j] = other.contact[j];
+      multiplier[j] = other.multiplier[j];
+    }
+    return *this;
+  }
+
   friend bool operator==(const ActiveSet& a, const ActiveSet& b) {
     return a.count == b.count && std::equal(a.contact.begin(), a.contact.begin() + a.count, b.contact.begin()) &&
            std::equal(a.multiplier.begin(), a.multiplier.begin() + a.count, b.multiplier.begin());

@@ -23,7 +23,7 @@ template <class Model>
 struct Trend {
   std::vector<typename Model::Control> controls;
   std::vector<Position<Model::kSpace>> mounts;
-  std::array<double, tolerances::kMaxActive> multipliers{};  // in the order of the active set
+  std::array<double, tolerances::kMaxTrend> multipliers{};  // in the order of the active set
 };
 
 template <class Model>
@@ -116,7 +116,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // Whether a shape continues the branch.
   bool try_free_shape();
   bool bend_freely();
-  bool meets_narrow_obstacle() const;
+  bool meets_another_side() const;
+  bool was_faced(int contact) const;
   double energy_loss(const Command& command) const;
   bool left_branch(const Command& command, double moved, double loss);
   bool follows_trend() const;

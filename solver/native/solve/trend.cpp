@@ -14,7 +14,7 @@ void ModelContinuation<Model>::update_trend() {
   clear_trend();
   const bool known = bends_evenly_ && !problem_.touches_obstacle(now);
   if (travelled == 0 || trial_.command.length != present_.command.length || moves_obstacles(trial_.command) || known ||
-      before.count != now.count ||
+      before.count != now.count || now.count > tolerances::kMaxTrend ||
       !std::equal(now.contact.begin(), now.contact.begin() + now.count, before.contact.begin()))
     return;
   const auto slope = [&](const auto& now, const auto& before, auto& slope) {
@@ -47,7 +47,7 @@ void ModelContinuation<Model>::extrapolate_trial() {
   }
   predicted_ = trial_.controls;
   for (std::size_t m = 0; m < trend_.mounts.size(); ++m) extrapolate(trial_.mounts[m], trend_.mounts[m]);
-  for (int j = 0; j < trial_.active.count; ++j)
+  for (int j = 0; j < std::min(trial_.active.count, tolerances::kMaxTrend); ++j)
     trial_.active.multiplier[j] = std::max(0.0, trial_.active.multiplier[j] + travelled * trend_.multipliers[j]);
 }
 

@@ -4,10 +4,11 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver import Robot, Scene, Solver, spatial
+from solver import Cable, Load, Robot, Scene, Solver, spatial
 from solver.planar.equilibrium import touching_points
 from solver.planar.robot import LINES
 
@@ -55,3 +56,40 @@ def test_in_space(robot, turns, ways):
     bends = most_turn(robot) * turns[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     curved = replace(robot, precurvature=tuple((x, y, 0.0) for x, y in bends))
     assert_bounded(spatial.SpatialSolver(curved, Scene()).rest().points, robot)
+
+
+@given(
+    robot=st.builds(spatial.SpatialRobot, touch=st.just(("backbone", "rim")), rim_points=st.just(6), **sizes),
+    turns=shares,
+    twists=shares,
+    ways=st.lists(st.integers(0, 5), min_size=SEGMENTS, max_size=SEGMENTS),
+)
+def test_twisted_in_space(robot, turns, twists, ways):
+    """Each segment bends straight away from one of the lines, and twists by up to 0.5 rad."""
+    angles = math.pi / 3 * np.array(ways) + math.pi / 2
+    bends = 0.9 * most_turn(robot) * turns
+    rotations = np.column_stack([bends * np.cos(angles), bends * np.sin(angles), twists / 2])
+    curved = replace(robot, precurvature=tuple(map(tuple, rotations.tolist())))
+    assert_bounded(spatial.SpatialSolver(curved, Scene()).rest().points, curved)
+
+
+@pytest.mark.parametrize("force", [0.5, 2.0])
+def test_twisted_by_loads(force):
+    """A couple twists a curved segment, that resists it but little, as far as the bound allows."""
+    couple = tuple(
+        Load(node=1, force=(0.0, sign * force, 0.0), at=(8.0, way)) for sign, way in ((1, 0.0), (-1, math.pi))
+    )
+    robot = spatial.SpatialRobot(
+        length_mm=20.0,
+        segments=2,
+        offset_mm=8.0,
+        torsion_ratio=0.01,
+        max_tension=math.inf,
+        cables=(Cable(),),
+        loads=couple,
+        precurvature=((0.0, 1.2, 0.0), (0.0, 0.0, 0.0)),
+        touch=("backbone", "rim"),
+    )
+    rest = spatial.SpatialSolver(robot, Scene()).rest()
+    assert abs(rest.controls[0, 2]) > robot.segment_mm / (2 * robot.offset_mm)
+    assert_bounded(rest.points, robot)

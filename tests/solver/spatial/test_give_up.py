@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Cable, Load, Scene, Status
-from solver.spatial import SpatialRobot, SpatialSolver, Sphere
+from solver.spatial import HalfSpace, SpatialRobot, SpatialSolver, Sphere
 
 
 def test_a_descent_that_loses_no_energy_leaves_a_wedged_robot_the_work_to_reach_its_tension_limit():
@@ -79,3 +79,29 @@ def test_a_descent_leaves_a_contact_that_stays_closed_without_sliding_along_it_a
         small = solver.step(small, start.cables_mm + share * (goal - start.cables_mm))
     assert state.status is small.status is Status.SNAPPED
     assert state.nodes == pytest.approx(small.nodes, abs=1e-6 * robot.length_mm)
+
+
+@pytest.mark.parametrize(
+    ("walls", "commands"),
+    [
+        ((8.452, 8.251, -9.564, -7.145), ((-2.9, 6.0), (-5.9, 9.0))),
+        ((9.292, 7.665, -9.843, -8.569), ((4.2, -4.4), (7.2, -8.5), (0.1, -12.0))),
+    ],
+)
+def test_a_robot_presses_against_a_narrow_channel_at_very_many_points(walls, commands):
+    """Up to 33 contacts at once, of a robot of 18 segments."""
+    robot = SpatialRobot.prototype(model="paper", angle=2 * math.pi / 3, between=1)
+    right, back, left, front = walls
+    sides = (
+        ((right, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+        ((0.0, back, 0.0), (0.0, -1.0, 0.0)),
+        ((left, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        ((0.0, front, 0.0), (0.0, 1.0, 0.0)),
+    )
+    solver = SpatialSolver(robot, Scene(HalfSpace(point=point, normal=normal) for point, normal in sides))
+    state = solver.rest()
+    for command in commands:
+        state = solver.step(state, command)
+        assert state.status in (Status.CONVERGED, Status.SNAPPED, Status.STALLED)
+        residuals = state.residuals()
+        assert max(residuals.stationarity * robot.length_mm, residuals.gaps / robot.length_mm) < 1e-8
