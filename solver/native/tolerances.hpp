@@ -109,6 +109,7 @@ inline constexpr double kBarrierShear =
     0.95;  // squared shear, over that of a segment that folds over, where the barrier begins
 inline constexpr double kBarrierCurvature = 10.0;  // curvature of the barrier [rad²]
 inline constexpr int kDescentIterations = 300;
+inline constexpr int kShearingIterations = 1000;  // the same of the paper's models, which may shear segment by segment
 inline constexpr int kFinishEvery = 8;       // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;  // largest step of one iterate
 inline constexpr double kSmallestPart =

@@ -27,7 +27,8 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   present_evaluated_ = false;
   problem_.enable_barrier(true);
   bool moved = newton_.set_metric(present_) && leave_towards(command), folded = false;
-  for (int i = 0; i < kDescentIterations && moved && !work_is_spent(); ++i) {
+  constexpr int kIterations = Model::kRod ? kDescentIterations : kShearingIterations;
+  for (int i = 0; i < kIterations && moved && !work_is_spent(); ++i) {
     std::swap(present_, trial_);
     record_shape();
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton();
@@ -80,7 +81,23 @@ bool ModelContinuation<Model>::leave_towards(const Command& command) {
     const Command nearer = between(present_.command, command, part);
     if (restore_at(nearer, true) || restore_at(nearer, false) || buckle_at(nearer)) return true;
   }
-  return false;
+  return change_sides(command);
+}
+
+// Leaves in `trial_` the equilibrium nearby under a command that pulls the other cable of a pair in eq. 13: however
+// little is pulled, these cables give a robot in contact another shape, which no small motion leads to.
+template <class Model>
+bool ModelContinuation<Model>::change_sides(const Command& command) {
+  if constexpr (Model::kRod || kSpace == 2) return false;
+  bool changes = false;
+  for (int k = 0; k < kCables; ++k)
+    changes |= std::signbit(present_.command.cables[k]) != std::signbit(command.cables[k]);
+  if (!changes) return false;
+  trial_ = present_;
+  trial_.command = command;
+  const NewtonResult found = newton_.solve(trial_, kDampedIterations);
+  result_.iterations += found.iterations;
+  return found.converged && trial_is_close();
 }
 
 // Leaves in `trial_` the feasible shape closest to `present_` under a command, with the active gaps held closed or not.

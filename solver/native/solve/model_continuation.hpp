@@ -172,6 +172,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   End finish_descent(bool motor_holds, bool held);
   End undo_descent(End end);
   bool leave_towards(const Command& command);
+  bool change_sides(const Command& command);
   bool restore_at(const Command& command, bool holding);
   bool buckle_at(const Command& command);
   bool descend_once(bool& moved);
