@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from soak.cores import CoreCheck
+from soak.ends import holes_meet, is_wedged
 from soak.shapes import distance
 from soak.walks import Numbers, command_of, step
 from solver import Robot, Status
@@ -25,7 +26,7 @@ ROUNDOFF = 1e-12
 BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
 PRETENSION = 0.00625 * 1.001  # of the offset: a cable displaced less is practically slack
-REPEATED = ("far", "pinched", "unexplained")  # reasons that repeats show
+REPEATED = ("far", "pinched", "wedged", "unexplained")  # reasons that repeats show
 REPEATS = 300  # of a command that was given up on, each of which must come nearer
 PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
 STALLED_AGAIN = 3  # stalled steps of an episode that are repeated
@@ -118,7 +119,7 @@ def _optimality(solver, taken, tally, offset):
         event = state.status != Status.CONVERGED and not np.array_equal(before.block, state.block)
         tally.events += event
         wanted = (event and certified < tally.certificates_each) or (offset + k) % CERTIFY_EVERY == 0
-        if wanted:
+        if wanted and not _holes_meet(state):
             certified += 1
             tally.certified += 1
             worst = certificate(state) / _strain(state)
@@ -129,10 +130,26 @@ def _optimality(solver, taken, tally, offset):
 
 
 def _strain(state):
-    """Return by how much tensions that no motor limits exceed those that bend the robot, at least 1."""
+    """Return by how much forces exceed those that bend the robot, and their roundoff with them, at least 1.
+
+    These are tensions that no motor limits, and contact forces beyond PINCHED EI/L².
+    """
     robot = state.robot
-    unit = robot.rigidity / (robot.offset_mm * robot.longest_mm)
-    return max(1.0, float(np.max(state.tensions)) / unit) if np.isinf(robot.max_tension) else 1.0
+    bending = robot.rigidity / robot.longest_mm**2
+    strain = max(1.0, float(_largest_contact_force(state)) / (PINCHED * bending))
+    if np.isfinite(robot.max_tension):
+        return strain
+    return max(strain, float(np.max(state.tensions)) * robot.offset_mm / (bending * robot.longest_mm))
+
+
+def _largest_contact_force(state):
+    """Return the largest force of an obstacle on a single point [N]."""
+    return state.energy_scale * state.multipliers.max(initial=0.0)
+
+
+def _holes_meet(state):
+    robot = state.robot
+    return robot.model == "rod" and not isinstance(robot, Robot) and holes_meet(state)
 
 
 def certificate(state):
@@ -197,13 +214,16 @@ def _reason(solver, taken, k, repeats=REPEATS):
     one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
     more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
     draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
-    limit to that. ``buckled``: the work of one step is spent while cables, which no limit stops before, pull against
+    limit to that. ``wedged``: no repeat comes nearer any more, and by the slopes of the closed gaps alone no motion
+    does. ``holes meet``: two holes of a taut cable do, where its length has no slope. ``buckled``: the work of one step is spent while cables, which no limit stops before, pull against
     each other so much that segments bend to and fro, from pattern to pattern in many small snaps.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = "work" if state.factorizations > WORK else _trace(solver, taken.states[k], command).reason
     if reason == "folded":
         return reason
+    if _holes_meet(state):
+        return "holes meet"
     near_zero = PRETENSION * robot.offset_mm
     pulled = command_of(state)[:-1]
     if robot.model == "paper" and isinstance(robot, Robot):
@@ -221,7 +241,9 @@ def _reason(solver, taken, k, repeats=REPEATS):
         return "far"
     if _trace(solver, state, command).reason == "folded":
         return "folded"
-    return "pinched" if _is_pinched(state, command) else "unexplained"
+    if _is_pinched(state, command):
+        return "pinched"
+    return "wedged" if is_wedged(state, command) else "unexplained"
 
 
 def _repeated(solver, state, command, repeats):

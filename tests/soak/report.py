@@ -68,7 +68,18 @@ class Tally:
         return vars(self) | {"contact_share": self.contact / max(1, self.steps)}
 
 
-REASONS = ("folded", "slack", "crossing", "far", "pinched", "buckled", "unexplained", "not looked at")
+REASONS = (
+    "folded",
+    "slack",
+    "crossing",
+    "far",
+    "pinched",
+    "wedged",
+    "holes meet",
+    "buckled",
+    "unexplained",
+    "not looked at",
+)
 ROWS = {
     "steps": lambda t: f"{t.steps:,}",
     "in contact": lambda t: f"{t.contact / max(1, t.steps):.1%}",
