@@ -208,15 +208,16 @@ def _is_same(case, other):
 def _reason(solver, taken, k, repeats=REPEATS):
     """Return why a step was given up on, "not looked at" where that takes repeats and there are to be none.
 
-    ``folded``: the branch ends, at once or after repeats, where a segment of the paper's models folds over.
-    ``slack``: without pretension the shape of the paper's model is undetermined. ``crossing``: the pulled cable of
-    a pair changes in contact, where the shape of the paper's model jumps. ``far``: the command exceeds the work of
-    one step; each repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any
-    more, and obstacles squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or
-    draws it, or a cable of the paper's models pushes it, into a place that is too narrow, and these models set no
-    limit to that. ``wedged``: no repeat comes nearer any more, and by the slopes of the closed gaps alone no motion
-    does. ``holes meet``: two holes of a taut cable do, where its length has no slope. ``buckled``: the work of one step is spent while cables, which no limit stops before, pull against
-    each other so much that segments bend to and fro, from pattern to pattern in many small snaps.
+    ``folded``: the branch ends, at once or after repeats, where a segment of the paper's models folds over. ``slack``:
+    without pretension the shape of the paper's model is undetermined. ``crossing``: the pulled cable of a pair changes
+    in contact, where the shape of the paper's model jumps. ``far``: the command exceeds the work of one step; each
+    repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any more, and obstacles
+    squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or draws it, or a cable of
+    the paper's models pushes it, into a place that is too narrow, and these models set no limit to that. ``wedged``: no
+    repeat comes nearer any more, and by the slopes of the closed gaps alone no motion does. ``holes meet``: two holes
+    of a taut cable do, where its length has no slope. ``buckled``: the work of one step is spent while cables, which no
+    limit stops before, pull against each other so much that segments bend to and fro, from pattern to pattern in many
+    small snaps.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = "work" if state.factorizations > WORK else _trace(solver, taken.states[k], command).reason

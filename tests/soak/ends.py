@@ -1,9 +1,10 @@
 """Where branches end for good, by the shape and the node-coordinate problem alone, which share nothing with the kernel.
 
-A motion ``dz`` of the nodes and a change ``dp`` of the command keep every segment whole where ``A dz + h_p dp = 0``, and
-no obstacle is entered where ``G dz >= 0`` for the closed gaps. Where ``Gᵀν = Aᵀy`` with ``ν >= 0``, each such motion has
-``yᵀ h_p dp = −νᵀ G dz <= 0``: none meets a command for which it is positive (Farkas' lemma). To first order, that is; as
-multipliers grow without bound where a branch of stable shapes ends so, their curvature forbids motions of second order.
+A motion ``dz`` of the nodes and a change ``dp`` of the command keep every segment whole where ``A dz + h_p dp = 0``,
+and enter no obstacle where ``G dz >= 0`` for the closed gaps. Where ``Gᵀν = Aᵀy`` with ``ν >= 0``, each such motion has
+``yᵀ h_p dp = −νᵀ G dz <= 0``: none meets a command for which it is positive (Farkas' lemma). That is to first order.
+Where a branch of stable shapes ends so, the multipliers grow without bound, and the curvature of the gaps, which alone
+decides then about stability, rules out motions of second order.
 """
 
 import numpy as np
@@ -22,7 +23,7 @@ def is_wedged(state, command):
 
 
 def wedge(state, command):
-    """Return how far multipliers are from balancing each other, over the slopes, and ``yᵀ h_p dp`` of a command [mm]."""
+    """Return ``|Gᵀν − Aᵀy|`` over the slopes, where Σν = 1, and ``yᵀ h_p dp`` of a command [mm]."""
     unknowns, parameters = state._node_point()
     _, shapes, shape_slopes, clearance, slopes = (part.full() for part in state._derivatives(unknowns, parameters))
     limits = len(clearance) - state.gaps[:, :, 1:].size
