@@ -110,8 +110,10 @@ inline constexpr double kBarrierShear =
 inline constexpr double kBarrierCurvature = 10.0;  // curvature of the barrier [rad²]
 inline constexpr int kDescentIterations = 300;
 inline constexpr int kShearingIterations = 1000;  // the same of the paper's models, which may shear segment by segment
-inline constexpr int kFinishEvery = 8;       // iterates between trials of Newton's method
-inline constexpr double kDescentCap = 0.03;  // largest step of one iterate
+inline constexpr int kFinishEvery = 8;            // iterates between trials of Newton's method
+inline constexpr double kDescentCap = 0.03;       // largest step of one iterate
+inline constexpr int kLongDescent = 100;          // iterates of the paper's models, after which they may be
+inline constexpr double kDescentStride = 0.1;     // as large as this
 inline constexpr double kSmallestPart =
     1e-3;  // smallest first step of a descent, as a fraction of the sub-step that ended the branch
 inline constexpr double kCreep = 1e-4;                // size of an iterate that hardly moves

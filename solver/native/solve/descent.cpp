@@ -32,7 +32,8 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
     std::swap(present_, trial_);
     record_shape();
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton();
-    const bool ended = finished || descend_once(moved);
+    const bool strides = !Model::kRod && i >= kLongDescent;
+    const bool ended = finished || descend_once(strides ? kDescentStride : kDescentCap, moved);
     folded = !finished && problem_.in_barrier();
     if (!ended) continue;
     if (folded && !try_newton()) break;
@@ -127,13 +128,12 @@ bool ModelContinuation<Model>::buckle_at(const Command& command) {
   return false;
 }
 
-// One iterate of the descent from `present_` to `trial_`, shortened until nothing is jumped over. True at an
-// equilibrium.
+// One iterate of the descent from `present_` to `trial_`, of at most a size, shortened until nothing is jumped over.
+// True at an equilibrium.
 template <class Model>
-bool ModelContinuation<Model>::descend_once(bool& moved) {
+bool ModelContinuation<Model>::descend_once(double cap, bool& moved) {
   moved = false;
   if (is_interrupted()) return false;
-  double cap = kDescentCap;
   for (int shortening = 0; shortening < kDescentShortenings; ++shortening, cap /= 4) {
     trial_ = present_;
     ++result_.iterations;

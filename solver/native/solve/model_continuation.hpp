@@ -175,7 +175,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool change_sides(const Command& command);
   bool restore_at(const Command& command, bool holding);
   bool buckle_at(const Command& command);
-  bool descend_once(bool& moved);
+  bool descend_once(double cap, bool& moved);
   bool try_newton();
   bool trial_is_close() const;
 
