@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from solver import Capsule, Circle, Ellipse, Polygon, Robot, Scene, Solver, Status
+from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver, Status
 
 PAPER = replace(Robot.prototype(model="paper"), model="paper", touch=("backbone", "cable"), between=0)
 SMALL = replace(PAPER, length_mm=12.45, offset_mm=0.8, disk_radius_mm=0.8, rigidity=50.0, max_cable_mm=2.513)
@@ -51,6 +51,24 @@ PULLED_OVER_A_CORNER = (
         axis=(0.3615523259858288, 0.9323518196336815),
     ),
 )
+LONG = replace(PAPER, segments=30, length_mm=105.2, length_range_mm=(100.0, 180.0))
+SLIPS_OFF_A_SPRING = (
+    HalfPlane(point=(61.628, 45.904), normal=(-0.8902905579278502, -0.4553929319439613)),
+    Polygon(
+        corners=(
+            (59.87364471093608, 43.168565794657326),
+            (70.3993359290978, 39.13445428967589),
+            (83.59556146782822, 45.55624233737861),
+            (86.89652826388443, 54.27214149863278),
+            (80.32732579401737, 68.57342618453072),
+            (72.33394986064602, 71.6849618306714),
+            (60.34824701425899, 68.13922793410491),
+            (54.405416064220915, 53.57592282651557),
+        ),
+        radius=2.3214772388822036,
+        spring=0.21,
+    ),
+)
 
 
 @pytest.mark.parametrize(
@@ -72,8 +90,14 @@ PULLED_OVER_A_CORNER = (
             PULLED_OVER_A_CORNER,
             ((11.760266471349633, None), (12.321153669669558, None), (12.487393185968, None)),
         ),
+        (LONG, SLIPS_OFF_A_SPRING, ((16.684440648566614, 174.86340406235342), (6.810434947841618, 176.34558792448638))),
     ],
-    ids=["no penalty shows that it is stable", "pegs hold it far from its free shape", "a step beyond a corner"],
+    ids=[
+        "no penalty shows that it is stable",
+        "pegs hold it far from its free shape",
+        "a step beyond a corner",
+        "its segments shear one after another",
+    ],
 )
 def test_not_given_up(robot, scene, commands):
     solver = Solver(robot, Scene(scene))

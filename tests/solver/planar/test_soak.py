@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from soak.cores import CoreCheck, windings
+from soak.ends import is_wedged
 from soak.episodes import STEPS, Episode, play
 from soak.report import Tally
 
-from solver import Capsule, Circle, Robot, Scene, Solver
+from solver import Capsule, Circle, Robot, Scene, Solver, Status
 from solver.common.robot import MODELS
 
 SHORT = 3000
@@ -43,6 +44,25 @@ def test_every_step_given_up_on_is_looked_at():
 def test_an_episode_follows_from_its_seed():
     first, again = (play(Episode("paper", 3, 4))[0] for _ in range(2))
     assert first == again
+
+
+def test_a_robot_that_its_cable_pushes_between_circles_is_wedged():
+    """It can go back, but no farther, by the slopes of the closed gaps alone; in ordinary contact both is open."""
+    robot = Robot.prototype(model="paper", length_mm=155.13360802275173, between=1, length_range_mm=(100.0, 180.0))
+    circles = (
+        Circle(center=(40.92822065361144, 136.2802478659636), radius=3.019327553383534),
+        Circle(center=(32.92933167426361, 127.59814622765555), radius=3.067062362197335),
+    )
+    solver = Solver(robot, Scene(circles))
+    states = [solver.rest()]
+    for command in ((4.48, 141.97), (14.34, 143.33), (0.05, 144.16), (3.7028190119548805, 180.0), (0.0, 180.0)):
+        states.append(solver.step(states[-1], *command))
+    wedged = states[-1]
+    assert wedged.status is Status.GAVE_UP
+    assert is_wedged(wedged, np.array([0.0, 180.0]))
+    assert not is_wedged(wedged, np.array([1.0, 180.0]))
+    assert solver.step(wedged, 1.0, 180.0).status < Status.BLOCKED
+    assert not any(is_wedged(state, np.array(command)) for state in states[:-1] for command in ((0, 180), (9, 150)))
 
 
 PLACE = np.array([[0.0, 0.0]])

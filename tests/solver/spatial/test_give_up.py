@@ -81,6 +81,26 @@ def test_a_descent_leaves_a_contact_that_stays_closed_without_sliding_along_it_a
     assert state.nodes == pytest.approx(small.nodes, abs=1e-6 * robot.length_mm)
 
 
+def channel(right, back, left, front):
+    """Return the sides of a channel along z, at these places."""
+    sides = (
+        ((right, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+        ((0.0, back, 0.0), (0.0, -1.0, 0.0)),
+        ((left, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        ((0.0, front, 0.0), (0.0, 1.0, 0.0)),
+    )
+    return Scene(HalfSpace(point=point, normal=normal) for point, normal in sides)
+
+
+def assert_certified(state):
+    """Assert that a state solves the node-coordinate problem."""
+    residuals, length = state.residuals(), state.robot.length_mm
+    assert max(residuals.stationarity * length, residuals.gaps / length) < 1e-8
+
+
+IN_A_CHANNEL = SpatialRobot.prototype(model="paper", angle=2 * math.pi / 3, between=1)
+
+
 @pytest.mark.parametrize(
     ("walls", "commands"),
     [
@@ -90,18 +110,28 @@ def test_a_descent_leaves_a_contact_that_stays_closed_without_sliding_along_it_a
 )
 def test_a_robot_presses_against_a_narrow_channel_at_very_many_points(walls, commands):
     """Up to 33 contacts at once, of a robot of 18 segments."""
-    robot = SpatialRobot.prototype(model="paper", angle=2 * math.pi / 3, between=1)
-    right, back, left, front = walls
-    sides = (
-        ((right, 0.0, 0.0), (-1.0, 0.0, 0.0)),
-        ((0.0, back, 0.0), (0.0, -1.0, 0.0)),
-        ((left, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        ((0.0, front, 0.0), (0.0, 1.0, 0.0)),
-    )
-    solver = SpatialSolver(robot, Scene(HalfSpace(point=point, normal=normal) for point, normal in sides))
+    solver = SpatialSolver(IN_A_CHANNEL, channel(*walls))
     state = solver.rest()
     for command in commands:
         state = solver.step(state, command)
         assert state.status in (Status.CONVERGED, Status.SNAPPED, Status.STALLED)
-        residuals = state.residuals()
-        assert max(residuals.stationarity * robot.length_mm, residuals.gaps / robot.length_mm) < 1e-8
+        assert_certified(state)
+
+
+@pytest.mark.parametrize(
+    ("walls", "start", "goal"),
+    [
+        ((9.288, 9.072, -9.733, -8.550), (8.112, -0.111), (10.145, 4.361)),
+        ((10.042, 8.977, -9.361, -7.750), (-7.894, 0.422), (-7.136, -4.444)),
+    ],
+)
+def test_the_other_cable_of_a_pair_is_pulled_in_contact(walls, start, goal):
+    """It runs through the opposite holes, which gives the robot a shape 1 mm away: it snaps there."""
+    solver = SpatialSolver(IN_A_CHANNEL, channel(*walls))
+    before = solver.step(solver.rest(), start)
+    state = solver.step(before, goal)
+    assert before.tensions[1] < 0
+    assert state.status is Status.STALLED
+    assert state.tensions.max() == pytest.approx(15, rel=1e-6)
+    assert state.cables_mm[1] * goal[1] > 0
+    assert_certified(state)

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from soak.cores import CoreCheck
+from soak.ends import holes_meet
 from soak.episodes import STEPS, Episode, play, setting_of
 from soak.report import Tally
 from soak.walks import sample_increments, step, walk
 
-from solver import Scene, Status
-from solver.spatial import Box, Capsule, Cylinder, SpatialRobot, Sphere
+from solver import Cable, Scene, Status
+from solver.spatial import Box, Capsule, Cylinder, SpatialRobot, SpatialSolver, Sphere
 
 SHORT = 2000
 ROBOT = replace(SpatialRobot.prototype(model="paper"), touch=("backbone",))
@@ -38,6 +39,16 @@ def test_a_step_among_contacts_that_wedge_the_robot_stalls_when_it_is_repeated()
     wedged = taken.states[-1]
     assert wedged.tensions.max() > 1.5 * taken.states[-2].tensions.max()
     assert step(setting.solver, wedged, taken.commands[-1]).status is Status.STALLED
+
+
+def test_holes_of_a_taut_cable_meet_where_the_disks_of_a_soft_segment_do():
+    rigidity = (5000.0,) * 4 + (100.0,) + (5000.0,) * 4
+    robot = SpatialRobot.prototype(model="rod", segments=9, cables=(Cable(),), segment_rigidity=rigidity)
+    solver = SpatialSolver(robot, Scene())
+    states = [solver.rest()]
+    for cable in (20.0, 24.0, 24.3, 24.5):
+        states.append(solver.step(states[-1], (cable,)))
+    assert [holes_meet(state) for state in states] == [False, False, False, False, True]
 
 
 @pytest.mark.parametrize(
