@@ -74,7 +74,8 @@ class SpatialSolver(SpatialCommandCheck):
     def rest(self) -> SpatialEquilibrium:
         """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature.
 
-        A cable that would hold a precurved robot back is paid out until it just does not.
+        A cable that would hold a precurved robot back is paid out until it just does not, and one that the loads pull
+        with more than ``max_tension`` until its motor holds it: ``STALLED``.
         """
         return self._rest
 
