@@ -8,7 +8,7 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.common.checks import check_clear, check_scene
+from solver.common.checks import check_carried, check_clear, check_scene
 from solver.common.equilibrium import BaseEquilibrium, RobotT_co
 from solver.common.geometry import StraightRobot
 from solver.common.layout import Layout
@@ -147,14 +147,17 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         """Bring some robots to rest again, as ``rest()`` of their solver.
 
         Raises:
-            ValueError: If an index is out of range or repeated, or a robot has no scene; nothing has changed then.
+            ValueError: If an index is out of range or repeated, or a robot has no scene; nothing has changed then. If
+                the motors of a robot cannot carry its loads, which then does not move, while the others are at rest.
         """
         indices = self._check_assigned(robots)
         with self._exclusive:
             self._unrested.update(indices)
             self._rest(indices)
             self.commands[indices] = self.blocks[indices, : self.cables + 1]  # cables and length
-            self._unrested.difference_update(indices)
+            self._unrested.difference_update(index for index in indices if self.statuses[index] != Status.GAVE_UP)
+        for index in self._unrested.intersection(indices):
+            check_carried(self.robot_of(index), self.statuses[index])
 
     def step(
         self, cable_mm: np.ndarray, robots: Sequence[int] | None = None, scenes: Sequence[Scene] | None = None

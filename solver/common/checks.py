@@ -55,11 +55,20 @@ def check_rest(rest: BaseEquilibrium[AnyRobot]) -> None:
         ValueError: As :func:`check_clear`, or naming the tension limit and how far the cables can be paid out.
     """
     check_clear(rest.robot, rest.scene, np.where(rest.contact, 0.0, rest.gaps))
-    if rest.status is Status.GAVE_UP:
+    check_carried(rest.robot, rest.status)
+
+
+def check_carried(robot: AnyRobot, status: int) -> None:
+    """Check by the status of its rest that a robot is in equilibrium with all of its loads.
+
+    Raises:
+        ValueError: Naming the tension limit and how far the cables can be paid out.
+    """
+    if status == Status.GAVE_UP:
         raise ValueError(
-            f"max_tension is {rest.robot.max_tension:.6g} N; at rest the loads of the robot cannot all be carried "
-            f"within it, its cables paid out to {rest.robot.least_cable_mm:.6g} mm at most: raise max_tension, lower "
-            "loads or weight, or add an opposed cable"
+            f"max_tension is {robot.max_tension:.6g} N; at rest the loads of the robot cannot all be carried within "
+            f"it, its cables paid out to {robot.least_cable_mm:.6g} mm at most: raise max_tension, lower loads or "
+            "weight, or add an opposed cable"
         )
 
 
