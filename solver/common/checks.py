@@ -35,7 +35,7 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
 
 
 def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
-    """Check that no obstacle overlaps the straight robot, whose gaps are given, ``(m, p, k)``.
+    """Check that no obstacle overlaps the unstressed robot, whose gaps are given, ``(m, p, k)``.
 
     Raises:
         ValueError: Naming the obstacle, the node and the depth.
@@ -43,7 +43,7 @@ def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
     for obstacle, own in zip(scene, gaps, strict=True):
         if own.min() < 0:
             node = int(np.unravel_index(own.argmin(), own.shape)[1]) // (robot.between + 1)
-            raise ValueError(f"{shown(obstacle)} overlaps the straight robot by {-own.min():.3g} mm at node {node}")
+            raise ValueError(f"{shown(obstacle)} overlaps the unstressed robot by {-own.min():.3g} mm at node {node}")
 
 
 def check_rest(rest: BaseEquilibrium[AnyRobot]) -> None:
