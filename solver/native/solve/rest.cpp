@@ -32,7 +32,7 @@ StepResult ModelContinuation<Model>::rest(double length, double* to) {
   mounts_ = present_.mounts;
   result_.status = problem_.violation() > 0 ? Status::kGaveUp : pursue({present_.command.cables, length});
   finish(present_.command, to);
-  if (present_.command.loads < 1) result_.status = Status::kGaveUp;
+  if (present_.command.loads < 1) result_.status = Status::kGaveUp;  // no equilibrium under all loads
   return result_;
 }
 
