@@ -24,7 +24,7 @@ CIRCLE = (
     "radius in {radius} L, the set-point in {force} EI/L²"
 )
 FEASIBLE = (
-    " Scenes are sampled until the obstacles leave the straight robot clear and a steady pull reaches the set-point "
+    " Scenes are sampled until the obstacles leave the unstressed robot clear and a steady pull reaches the set-point "
     "without a stall, block or snap."
 )
 

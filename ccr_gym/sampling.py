@@ -1,4 +1,4 @@
-"""Sampling of feasible episodes: scenes that leave the straight robot clear, with set-points that it can hold."""
+"""Sampling of feasible episodes: scenes that leave the unstressed robot clear, with set-points that it can hold."""
 
 import zlib
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ class Trials:
 
         The robots are among the obstacles then, in no equilibrium yet; whatever is raised, they are where they were.
 
-        An assignment is feasible if its obstacles leave the straight robot clear and pulling the cables steadily
+        An assignment is feasible if its obstacles leave the unstressed robot clear and pulling the cables steadily
         reaches the set-point, with a margin, without a stall, block or snap. Infeasible ones are sampled again.
 
         Args:

@@ -78,7 +78,7 @@ def _sample_solver(robot, generator):
         scene = Scene([sample(generator) for _ in range(generator.integers(1, 4))])
         try:
             return kind(robot, scene)
-        except ValueError:  # overlaps the straight robot
+        except ValueError:  # overlaps the unstressed robot
             continue
 
 

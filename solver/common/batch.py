@@ -8,9 +8,9 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.common.checks import check_clear, check_scene
+from solver.common.checks import check_carried, check_clear, check_scene
 from solver.common.equilibrium import BaseEquilibrium, RobotT_co
-from solver.common.geometry import StraightRobot
+from solver.common.geometry import UnstressedRobot
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
 from solver.common.rows import Motion, RowBatch
@@ -68,8 +68,8 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         threads = check_whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "more do not help")
         RowBatch.__init__(self, robot, count, self._make_layout(robot, obstacles), threads)
         self._work = self.statuses, self.iterations, self.factorizations
-        self._straight = self._straightened(robot)
-        self._last_straight = self._straight  # of the last robot that was put among obstacles
+        self._unstressed = self._make_unstressed(robot)
+        self._last_unstressed = self._unstressed  # of the last robot that was put among obstacles
 
     @abstractmethod
     def _make_layout(self, robot: Any, obstacles: int) -> Layout:
@@ -82,8 +82,8 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         """Return the equilibrium of a block."""
 
     @abstractmethod
-    def _straight_points(self, robot: Any) -> np.ndarray:
-        """Return the points of a straight robot that can touch, ``(p, k, d)`` [mm]."""
+    def _unstressed_points(self, robot: Any) -> np.ndarray:
+        """Return the points that can touch of a robot that nothing strains, ``(p, k, d)`` [mm]."""
 
     def assign(self, index: int, scene: Scene, robot: RobotT_co | None = None) -> None:
         """Assign a scene to a robot, which must then be brought to rest by :meth:`rest` before it moves.
@@ -103,10 +103,10 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         """
         if not self.assign_if_clear(index, scene, robot):
             robot = robot or self.robot
-            check_clear(robot, scene, self._straight_of(robot).gaps(scene))
+            check_clear(robot, scene, self._unstressed_of(robot).gaps(scene))
 
     def assign_if_clear(self, index: int, scene: Scene, robot: RobotT_co | None = None) -> bool:
-        """Assign a scene as :meth:`assign` if no obstacle overlaps the straight robot, and return whether none does.
+        """Assign a scene as :meth:`assign` if no obstacle overlaps the robot, and return whether none does.
 
         Raises:
             ValueError: As :meth:`assign`, but for obstacles that overlap; nothing has changed then.
@@ -121,7 +121,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             self._check_own(own)
         robot = own or self.robot
         compiled = self._compile(robot, scene)
-        if not self._straight_of(robot).is_clear_of(scene):
+        if not self._unstressed_of(robot).is_clear_of(scene):
             return False
         made = self._kernel_robot(own) if changes and own is not None else None
         with self._exclusive:
@@ -147,14 +147,17 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         """Bring some robots to rest again, as ``rest()`` of their solver.
 
         Raises:
-            ValueError: If an index is out of range or repeated, or a robot has no scene; nothing has changed then.
+            ValueError: If an index is out of range or repeated, or a robot has no scene; nothing has changed then. If
+                the motors of a robot cannot carry its loads, which then does not move, while the others are at rest.
         """
         indices = self._check_assigned(robots)
         with self._exclusive:
             self._unrested.update(indices)
             self._rest(indices)
             self.commands[indices] = self.blocks[indices, : self.cables + 1]  # cables and length
-            self._unrested.difference_update(indices)
+            self._unrested.difference_update(index for index in indices if self.statuses[index] != Status.GAVE_UP)
+        for index in self._unrested.intersection(indices):
+            check_carried(self.robot_of(index), self.statuses[index])
 
     def step(
         self, cable_mm: np.ndarray, robots: Sequence[int] | None = None, scenes: Sequence[Scene] | None = None
@@ -300,16 +303,16 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         block, status = self.blocks[index].copy(), Status(self.statuses[index])
         return self._make_equilibrium(self.robot_of(index), scene, block, status, *work)
 
-    def _straight_of(self, robot: Any) -> StraightRobot:
-        """Return a robot straight, kept for the batch's robot and the last other one."""
+    def _unstressed_of(self, robot: Any) -> UnstressedRobot:
+        """Return a robot that nothing strains, kept for the batch's robot and the last other one."""
         if robot is self.robot:
-            return self._straight
-        if robot is not self._last_straight.robot:
-            self._last_straight = self._straightened(robot)
-        return self._last_straight
+            return self._unstressed
+        if robot is not self._last_unstressed.robot:
+            self._last_unstressed = self._make_unstressed(robot)
+        return self._last_unstressed
 
-    def _straightened(self, robot: Any) -> StraightRobot:
-        return StraightRobot.of(robot, self._straight_points(robot))
+    def _make_unstressed(self, robot: Any) -> UnstressedRobot:
+        return UnstressedRobot.of(robot, self._unstressed_points(robot))
 
     def _lengths_mm(self, robots: list[int]) -> list[float]:
         """Return the lengths at rest of some robots [mm]."""

@@ -35,7 +35,7 @@ def check_core(robot: AnyRobot, scene: Scene) -> None:
 
 
 def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
-    """Check that no obstacle overlaps the straight robot, whose gaps are given, ``(m, p, k)``.
+    """Check that no obstacle overlaps the unstressed robot, whose gaps are given, ``(m, p, k)``.
 
     Raises:
         ValueError: Naming the obstacle, the node and the depth.
@@ -43,23 +43,33 @@ def check_clear(robot: AnyRobot, scene: Scene, gaps: np.ndarray) -> None:
     for obstacle, own in zip(scene, gaps, strict=True):
         if own.min() < 0:
             node = int(np.unravel_index(own.argmin(), own.shape)[1]) // (robot.between + 1)
-            raise ValueError(f"{shown(obstacle)} overlaps the straight robot by {-own.min():.3g} mm at node {node}")
+            raise ValueError(f"{shown(obstacle)} overlaps the unstressed robot by {-own.min():.3g} mm at node {node}")
 
 
 def check_rest(rest: BaseEquilibrium[AnyRobot]) -> None:
-    """Check that the motors hold the robot at rest, and that no obstacle overlaps it.
+    """Check that the robot at rest is in equilibrium with all of its loads, and that no obstacle overlaps it.
 
     An obstacle that its loads press it against is met to roundoff.
 
     Raises:
-        ValueError: As :func:`check_clear`, or naming the tension limit that its loads exceed.
+        ValueError: As :func:`check_clear`, or naming the tension limit and how far the cables can be paid out.
     """
-    if rest.status is Status.STALLED and rest.robot.least_cable_mm == 0:  # others pay out what they cannot hold
-        raise ValueError(
-            f"max_tension is {rest.robot.max_tension:.6g} N; at rest the loads of the robot pull its only cable, which "
-            "cannot be paid out below 0, with more: raise max_tension, lower loads or weight, or add an opposed cable"
-        )
     check_clear(rest.robot, rest.scene, np.where(rest.contact, 0.0, rest.gaps))
+    check_carried(rest.robot, rest.status)
+
+
+def check_carried(robot: AnyRobot, status: int) -> None:
+    """Check by the status of its rest that a robot is in equilibrium with all of its loads.
+
+    Raises:
+        ValueError: Naming the tension limit and how far the cables can be paid out.
+    """
+    if status == Status.GAVE_UP:
+        raise ValueError(
+            f"max_tension is {robot.max_tension:.6g} N; at rest the loads of the robot cannot all be carried within "
+            f"it, its cables paid out to {robot.least_cable_mm:.6g} mm at most: raise max_tension, lower loads or "
+            "weight, or add an opposed cable"
+        )
 
 
 def check_scene(robot: AnyRobot, kind: type, scene: Scene, space: int) -> None:

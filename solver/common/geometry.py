@@ -14,8 +14,8 @@ from solver.common.scene import Scene
 ROUNDING = 1 + 1e-9  # of a gap, over the size of the obstacle
 
 
-class StraightRobot(NamedTuple):
-    """The points of a straight robot that can touch obstacles.
+class UnstressedRobot(NamedTuple):
+    """The points that can touch obstacles of a robot that nothing strains, straight but for its precurvature.
 
     Attributes:
         robot: The robot.
@@ -31,7 +31,7 @@ class StraightRobot(NamedTuple):
 
     @classmethod
     def of(cls, robot: AnyRobot, points: np.ndarray) -> Self:
-        """Return the straight robot with these points ``(p, k, d)`` [mm]."""
+        """Return the unstressed robot with these points ``(p, k, d)`` [mm]."""
         return cls(robot, np.ascontiguousarray(points), points.min((0, 1)).tolist(), points.max((0, 1)).tolist())
 
     def gaps(self, scene: Scene) -> np.ndarray:

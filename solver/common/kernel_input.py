@@ -11,7 +11,7 @@ from solver.common.gap_laws import GapLaw, gap_function
 from solver.common.geometry import touchable_points
 from solver.common.obstacle import SHAPES, Obstacle
 from solver.common.robot import AnyRobot
-from solver.common.rod import AnyRod, full_cables, least_cable_mm
+from solver.common.rod import AnyRod, full_cables
 from solver.common.scene import Scene
 
 
@@ -78,6 +78,6 @@ def kernel_rod(robot: AnyRod, stiffness: np.ndarray, rest: np.ndarray, bounded_t
         rest=np.ascontiguousarray(rest, float),
         weight=weight,
         loads=loads,
-        least_pull=least_cable_mm(robot),
+        least_pull=robot.least_cable_mm,
         bounded_twist=bounded_twist,
     )

@@ -77,7 +77,8 @@ class RodBranch:
     def rest(self, unstressed: np.ndarray) -> tuple[RodPoint, Status, int]:
         """Return the robot under its loads, which are raised from none at the shape where nothing strains it.
 
-        A cable that would hold a precurved robot back is paid out until it just does not.
+        A cable that would hold a precurved robot back is paid out until it just does not. One whose tension reaches the
+        limit under a part of the loads is not: the status is ``GAVE_UP`` then.
         """
         command = np.array([*np.zeros(self._cables), self._robot.length_mm, 0.0])
         slacks = self._constraints(unstressed, self._parameters(command)).full().ravel()[self._equalities :]
@@ -85,7 +86,10 @@ class RodBranch:
         start = RodPoint(command, unstressed, np.zeros(self._lower.size))
         loaded = any(self._robot.weight_per_length) or bool(self._robot.loads)
         full = np.array([*command[:-1], 1.0])
-        return self.follow(start, full) if loaded else (start._replace(command=full), Status.CONVERGED, 0)
+        if not loaded:
+            return start._replace(command=full), Status.CONVERGED, 0
+        reached, status, iterations = self.follow(start, full)
+        return reached, status if reached.command[-1] == 1 else Status.GAVE_UP, iterations
 
     def start(self, equilibrium: BaseEquilibrium[AnyRod], cables_mm: np.ndarray) -> RodPoint:
         """Return an equilibrium as a solution of the node problem."""

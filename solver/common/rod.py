@@ -277,11 +277,6 @@ def _check_turns(robot: AnyRod, angles: tuple[float, ...]) -> None:
         raise ValueError('precurvature is given; the paper\'s model has no choice of it: choose model="rod"')
 
 
-def least_cable_mm(robot: AnyRod) -> float:
-    """Return the least displacement of a cable: 0 for one alone on a robot that is straight at rest [mm]."""
-    return 0.0 if len(robot.cables) == 1 and not np.any(np.asarray(robot.precurvature)) else -robot.cable_limit_mm
-
-
 def check_cables(robot: AnyRobot, name: str, cables_mm: object) -> tuple[float, ...]:
     """Return commanded displacements of the cables as floats; of a single cable it may be a number.
 

@@ -325,7 +325,8 @@ class RowBatch(ABC, Generic[RobotT_co]):
         for robot in self._unrested.intersection(robots):
             self.scene(robot)
             raise ValueError(
-                f"robot {robot} has a new scene, or its rest was interrupted; call rest([{robot}]) before it moves"
+                f"robot {robot} has a new scene, or its rest was interrupted or refused; call rest([{robot}]) "
+                "before it moves"
             )
 
 

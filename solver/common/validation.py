@@ -14,6 +14,7 @@ import numpy as np
 
 SMALLEST, LARGEST = 1e-30, 1e30  # of lengths [mm]: products of several of them stay normal numbers
 REAL = (int, float, np.integer, np.floating)
+UNIT_ROUNDING = 2**-50  # of the length of a unit vector, and of the scalar product of two that are perpendicular
 DEFINITE = 1e-9  # least ratio of the eigenvalues of a spring matrix
 SHOWN = 200  # characters of a value in a message
 
@@ -131,7 +132,7 @@ def check_pair(name: str, value: object) -> Pair:
 
 
 def check_direction(name: str, value: object, meaning: str, space: int = 2) -> Point:
-    """Return a direction of the plane or of space as a unit vector.
+    """Return a direction of the plane or of space as a unit vector; one that is a unit vector but for rounding stays.
 
     Raises:
         ValueError: If the vector vanishes, naming what it is for.
@@ -140,6 +141,8 @@ def check_direction(name: str, value: object, meaning: str, space: int = 2) -> P
     size = math.hypot(*numbers)
     if size < SMALLEST:
         raise ValueError(f"{name} is ({', '.join(f'{v:g}' for v in numbers)}); give the direction {meaning}")
+    if abs(size - 1) <= UNIT_ROUNDING:  # or copies would differ in the last bit
+        return numbers
     return tuple(v / size for v in numbers)
 
 

@@ -10,7 +10,7 @@ from solver.common.layout import Layout
 from solver.common.rows import Motion
 from solver.common.scene import Scene
 from solver.common.status import Status
-from solver.planar.equilibrium import Equilibrium, touching_points
+from solver.planar.equilibrium import Equilibrium, touching_points, unstressed_nodes
 from solver.planar.layout import layout
 from solver.planar.reference import ReferenceSolver
 from solver.planar.robot import Robot
@@ -26,10 +26,8 @@ class BatchSolver(RobotBatch[Robot, Equilibrium]):
     space = 2
     robot_kind = Robot
 
-    def _straight_points(self, robot: Robot) -> np.ndarray:
-        nodes = np.zeros((robot.segments + 1, 3))
-        nodes[:, 1] = np.linspace(0.0, robot.length_mm, len(nodes))
-        return touching_points(robot, nodes)
+    def _unstressed_points(self, robot: Robot) -> np.ndarray:
+        return touching_points(robot, unstressed_nodes(robot))
 
     def _make_layout(self, robot: Robot, obstacles: int) -> Layout:
         return layout(robot, obstacles)

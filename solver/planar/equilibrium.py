@@ -145,6 +145,15 @@ class Equilibrium(BaseEquilibrium[Robot]):
         )
 
 
+def unstressed_nodes(robot: Robot) -> np.ndarray:
+    """Return the node poses of a robot that nothing strains, straight but for its precurvature, ``(n+1, 3)``."""
+    turns = np.broadcast_to(robot.precurvature, robot.segments)
+    angles = np.concatenate([[0.0], -np.cumsum(turns)])
+    headings, chords = angles[:-1] - turns / 2, robot.segment_mm * np.sinc(turns / (2 * np.pi))
+    steps = chords[:, None] * np.column_stack([-np.sin(headings), np.cos(headings)])
+    return np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), angles])
+
+
 def touching_points(robot: Robot, nodes: np.ndarray) -> np.ndarray:
     """Return the points of ``robot.touch``, ``(lines, positions, 2)`` [mm], at node poses ``(n+1, 3)``.
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
 
+import numpy as np
+
 from solver.common.presets import preset_fields
 from solver.common.robot import (
     check_cable_limit,
@@ -16,7 +18,7 @@ from solver.common.robot import (
     longest_arc_edge,
     widest_bend,
 )
-from solver.common.rod import Cable, Load, check_rod, checked_angles, full_cables, least_cable_mm
+from solver.common.rod import Cable, Load, check_rod, checked_angles, full_cables
 from solver.common.validation import check_number, check_positive, check_sequence, refusal
 
 LINES = ("backbone", "cable", "rim")
@@ -229,7 +231,8 @@ class Robot:
     @property
     def least_cable_mm(self) -> float:
         """Least displacement of a cable: 0 for one alone on a robot that is straight at rest [mm]."""
-        return least_cable_mm(self)
+        alone = len(self.cables) == 1 and not np.any(self.precurvature)
+        return 0.0 if alone else -self.cable_limit_mm
 
     @property
     def cable_limit_mm(self) -> float:

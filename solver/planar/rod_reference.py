@@ -6,7 +6,7 @@ from solver.common.reference import RodBranch, RodPoint, write_contacts, write_r
 from solver.common.rod import bending_ratios
 from solver.common.scene import Scene
 from solver.common.status import Status
-from solver.planar.equilibrium import Equilibrium, touching_points
+from solver.planar.equilibrium import Equilibrium, touching_points, unstressed_nodes
 from solver.planar.forces import onset_tension
 from solver.planar.formulation import node_problem
 from solver.planar.free import tip_slopes
@@ -41,14 +41,9 @@ class RodReference:
 
     def _unstressed(self) -> np.ndarray:
         """Return the unknowns of the robot that nothing strains."""
-        robot = self._robot
-        turns = np.broadcast_to(robot.precurvature, robot.segments)
-        angles = np.concatenate([[0.0], -np.cumsum(turns)])
-        headings, chords = angles[:-1] - turns / 2, robot.segment_mm * np.sinc(turns / (2 * np.pi))
-        backbone = np.cumsum(chords[:, None] * np.column_stack([-np.sin(headings), np.cos(headings)]), axis=0)
-        disks = robot.offset_mm * np.column_stack([np.cos(angles), np.sin(angles)])
-        mounts = np.zeros(2 * sum(self._scene.mounted))
-        return np.concatenate([backbone.ravel(), (backbone + disks[1:]).ravel(), mounts])
+        nodes, mounts = unstressed_nodes(self._robot)[1:], np.zeros(2 * sum(self._scene.mounted))
+        disks = self._robot.offset_mm * np.column_stack([np.cos(nodes[:, 2]), np.sin(nodes[:, 2])])
+        return np.concatenate([nodes[:, :2].ravel(), (nodes[:, :2] + disks).ravel(), mounts])
 
     def _equilibrium(
         self, point: RodPoint, status: Status, iterations: int, before: Equilibrium | None = None

@@ -60,8 +60,9 @@ class Solver(CommandCheck):
         scene: The obstacles.
 
     Raises:
-        ValueError: If an obstacle is one of space, overlaps the straight robot, is small enough to slip between its
-            points, names a node the robot does not have, or is out of proportion to the robot.
+        ValueError: If an obstacle is one of space, overlaps the unstressed robot, which is straight but for its
+            precurvature, is small enough to slip between its points, names a node the robot does not have, or is out of
+            proportion to the robot; or if the motors cannot carry the robot's loads at rest.
         TypeError: If the robot or the scene is of the wrong class.
         RuntimeError: If a :class:`~solver.planar.custom.Custom` shape cannot be compiled.
     """
@@ -80,7 +81,8 @@ class Solver(CommandCheck):
     def rest(self) -> Equilibrium:
         """Return the unactuated robot under its loads, straight where it has neither loads nor precurvature.
 
-        A cable that would hold a precurved robot back is paid out until it just does not.
+        A cable that would hold a precurved robot back is paid out until it just does not, and one that the loads pull
+        with more than ``max_tension`` until its motor holds it: ``STALLED``.
         """
         return self._rest
 

@@ -7,7 +7,7 @@ from solver.common.batch import RobotBatch
 from solver.common.layout import Layout
 from solver.common.scene import Scene
 from solver.common.status import Status
-from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points, unstressed_nodes
 from solver.spatial.robot import SpatialRobot
 from solver.spatial.solve import kernel_robot, kernel_scene
 
@@ -21,10 +21,8 @@ class SpatialBatchSolver(RobotBatch[SpatialRobot, SpatialEquilibrium]):
     space = 3
     robot_kind = SpatialRobot
 
-    def _straight_points(self, robot: SpatialRobot) -> np.ndarray:
-        nodes = np.zeros((robot.segments + 1, 3))
-        nodes[:, 2] = np.linspace(0.0, robot.length_mm, len(nodes))
-        return touching_points(robot, nodes, np.tile(np.eye(3), (len(nodes), 1, 1)))
+    def _unstressed_points(self, robot: SpatialRobot) -> np.ndarray:
+        return touching_points(robot, *unstressed_nodes(robot))
 
     def _make_layout(self, robot: SpatialRobot, obstacles: int) -> Layout:
         return spatial_layout(robot, obstacles)

@@ -137,6 +137,26 @@ class SpatialEquilibrium(BaseEquilibrium[SpatialRobot]):
         return float(load_work(self.robot, segment, lambda node, at: nodes[node] + frames[node][:, :2] @ at))
 
 
+def unstressed_nodes(robot: SpatialRobot) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes and frames of a robot that nothing strains, straight but for its precurvature: ``(n+1, 3[, 3])``."""
+    nodes, frames = np.zeros((robot.segments + 1, 3)), np.tile(np.eye(3), (robot.segments + 1, 1, 1))
+    if not np.any(robot.precurvature):
+        nodes[:, 2] = np.linspace(0.0, robot.length_mm, len(nodes))
+        return nodes, frames
+    for i, turn in enumerate(np.broadcast_to(robot.precurvature, (robot.segments, 3))):
+        chord = robot.segment_mm * np.sinc(np.hypot(*turn[:2]) / (2 * np.pi))
+        nodes[i + 1] = nodes[i] + chord * (frames[i] @ _rotation(turn / 2))[:, 2]
+        frames[i + 1] = frames[i] @ _rotation(turn)
+    return nodes, frames
+
+
+def _rotation(turn: np.ndarray) -> np.ndarray:
+    """Return the rotation matrix of a rotation vector."""
+    angle = float(np.linalg.norm(turn))
+    axis = np.cross(turn / angle if angle else turn, np.eye(3)).T
+    return np.asarray(np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis)
+
+
 def touching_points(robot: SpatialRobot, nodes: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Return the points of ``robot.touch``, ``(lines, positions, 3)`` [mm], at nodes ``(n+1, 3)`` and their frames."""
     return subdivide(nodes + np.einsum("nij,pj->pni", frames[:, :, :2], robot.lines_mm), robot.between)

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.common.gap_laws import GapLaw
 from solver.common.obstacle import Extent, Obstacle
-from solver.common.validation import SMALLEST, Point, check_direction, check_point, check_positive
+from solver.common.validation import SMALLEST, UNIT_ROUNDING, Point, check_direction, check_point, check_positive
 from solver.spatial.formulation import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
 
 PARALLEL = 1e-6  # sine of the least angle between the axes of a box
@@ -227,13 +227,7 @@ class Box(SpatialObstacle):
                 f"edge is {self.edge}; it must be at most {min(self.sizes) / 2:.6g}, half the smallest size"
             )
         object.__setattr__(self, "axis", check_direction("axis", self.axis, "of the first axis", 3))
-        second = check_point("second", self.second, 3)
-        across = np.subtract(second, np.dot(second, self.axis) * np.array(self.axis))
-        if not np.linalg.norm(across) > PARALLEL * math.hypot(*second):
-            raise ValueError(f"second is {second}; give the direction of the second axis, across the first")
-        object.__setattr__(
-            self, "second", check_direction("second", across.tolist(), "of the second axis, across the first", 3)
-        )
+        object.__setattr__(self, "second", _across(self.axis, self.second))
 
     def _radii(self) -> list[tuple[str, float]]:
         return [("edge", self.edge), *(("a size", size) for size in self.sizes)]
@@ -260,6 +254,18 @@ class Box(SpatialObstacle):
         walls = [(0.0, -z), (1.0, -z), (1.0, z), (0.0, z)]
         corners = np.array([[(*(scale * corner), height) for corner in ring] for scale, height in walls])
         return np.asarray(self.center + corners @ self.axes)
+
+
+def _across(axis: Point, second: object) -> Point:
+    """Return the direction of the second axis of a box, made perpendicular to the first; one that is so stays."""
+    meaning = "of the second axis, across the first"
+    unit = check_direction("second", second, meaning, 3)
+    while abs(along := np.dot(unit, axis)) > UNIT_ROUNDING:
+        across = np.subtract(unit, along * np.array(axis))
+        if not np.linalg.norm(across) > PARALLEL:
+            raise ValueError(f"second is {second}; give the direction {meaning}")
+        unit = check_direction("second", across.tolist(), meaning, 3)
+    return unit
 
 
 def _check_ends(start: Point, end: Point) -> None:

@@ -5,7 +5,7 @@ import numpy as np
 from solver.common.reference import RodBranch, RodPoint, write_contacts, write_rod
 from solver.common.scene import Scene
 from solver.common.status import Status
-from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points, unstressed_nodes
 from solver.spatial.formulation import node_problem
 from solver.spatial.robot import SpatialRobot, stiffness_ratios
 
@@ -38,12 +38,8 @@ class SpatialRodReference:
 
     def _unstressed(self) -> np.ndarray:
         """Return the unknowns of the robot that nothing strains."""
-        robot, turns = self._robot, np.broadcast_to(self._robot.precurvature, (self._robot.segments, 3))
-        nodes, frames = np.zeros((robot.segments + 1, 3)), np.tile(np.eye(3), (robot.segments + 1, 1, 1))
-        for i, turn in enumerate(turns):
-            chord = robot.segment_mm * np.sinc(np.hypot(*turn[:2]) / (2 * np.pi))
-            nodes[i + 1] = nodes[i] + chord * (frames[i] @ _rotation(turn / 2))[:, 2]
-            frames[i + 1] = frames[i] @ _rotation(turn)
+        robot, (nodes, frames) = self._robot, unstressed_nodes(self._robot)
+        turns = np.broadcast_to(robot.precurvature, (robot.segments, 3))
         edges = nodes[1:] + robot.offset_mm * np.moveaxis(frames[1:, :, :2], 2, 0)
         mounts = np.zeros(3 * sum(self._scene.mounted))
         return np.concatenate([nodes[1:].ravel(), edges.ravel(), robot.offset_mm * turns.ravel(), mounts])
@@ -68,10 +64,3 @@ class SpatialRodReference:
         if before is not None and fields.multipliers(block).any():
             fields.onset(block)[:] = before.onset_tensions if before.contact.any() else before.tensions
         return SpatialEquilibrium(robot, self._scene, block, status, iterations)
-
-
-def _rotation(turn: np.ndarray) -> np.ndarray:
-    """Return the rotation matrix of a rotation vector."""
-    angle = float(np.linalg.norm(turn))
-    axis = np.cross(turn / angle if angle else turn, np.eye(3)).T
-    return np.asarray(np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis)

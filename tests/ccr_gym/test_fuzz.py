@@ -22,7 +22,7 @@ EVERY_FORM = pytest.mark.parametrize("count", [None, 3])  # number of environmen
 fuzz = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 SAMPLES = 20
 SLIPS = "could slip between points"
-OPTIONS = ("seed", "options", "scene", "desired_force", "reset_mask", "overlaps the straight robot", SLIPS)
+OPTIONS = ("seed", "options", "scene", "desired_force", "reset_mask", "overlaps the unstressed robot", SLIPS)
 UNREACHABLE = "widen the task's ranges"
 
 numbers = (

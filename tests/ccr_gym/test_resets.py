@@ -84,7 +84,7 @@ BAD_RESETS = [
     ),
     (
         {"seed": 5, "options": {"scene": Scene([Circle(center=(0, 90), radius=15)]), "desired_force": 0.1}},
-        "overlaps the straight robot",
+        "overlaps the unstressed robot",
     ),
     ({"seed": 5, "options": {"scene": scene_of("CCR/SpatialPush-v1"), "desired_force": 0.1}}, "Sphere"),
 ]

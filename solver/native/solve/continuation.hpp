@@ -44,7 +44,8 @@ class Continuation {
   virtual void set_interruption(Interruption interruption) = 0;
 
   // Writes the equilibrium of the robot at a length with no cable displaced. From its shape without loads, these are
-  // raised evenly; a cable that is too short for that shape is paid out.
+  // raised evenly; a cable that is too short for that shape, or that its motor cannot hold, is paid out. Gives up where
+  // only a part of the loads can be carried: that is no equilibrium.
   virtual StepResult rest(double length, double* to) = 0;
 
   // Takes the robot from the equilibrium in one block towards the command `target`, cables and length evenly, and

@@ -31,7 +31,9 @@ StepResult ModelContinuation<Model>::rest(double length, double* to) {
   points_ = problem_.points();
   mounts_ = present_.mounts;
   result_.status = problem_.violation() > 0 ? Status::kGaveUp : pursue({present_.command.cables, length});
-  return finish(present_.command, to);
+  finish(present_.command, to);
+  if (present_.command.loads < 1) result_.status = Status::kGaveUp;  // no equilibrium under all loads
+  return result_;
 }
 
 // Leaves in `trial_` the shape of the robot that nothing touches, where it bends alike in all segments: in closed form,

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from solver import PRESETS, Load, Robot, Scene, Solver, Status, spatial
+from solver import PRESETS, BatchSolver, Cable, Load, Robot, Scene, Solver, Status, spatial
 
 KINDS = {"plane": (Robot, Solver), "space": (spatial.SpatialRobot, spatial.SpatialSolver)}
 PULLING = [case for case in product(PRESETS, KINDS) if case != ("prototype", "plane")]  # the one that pays nothing out
@@ -55,3 +55,44 @@ def test_pays_out_what_the_motors_cannot_hold(name, kind, share):
     assert state.status is Status.STALLED
     assert state.tensions.max() <= limit
     assert unbalanced(state) < 1e-9
+
+
+@pytest.mark.parametrize("limit", [1.0, 2.0, 2.1, 2.2])
+def test_the_only_cable_of_a_robot_in_space_is_paid_out_as_one_of_two_is(limit):
+    alone = spatial.SpatialRobot.prototype(
+        cables=(Cable(),), max_tension=limit, loads=(Load(node=18, force=(-0.2, 0.05, 0.0)),)
+    )
+    solver = spatial.SpatialSolver(alone, Scene())
+    state = solver.rest()
+    other = rest(replace(alone, cables=(Cable(), Cable(angle=np.pi / 2))), limit, "space")
+    assert state.status is other.status is Status.STALLED
+    assert limit * (1 - 1e-6) <= state.tensions[0] <= limit
+    assert unbalanced(state) < 1e-9
+    assert state.cables_mm[0] < 0
+    assert state.cables_mm[0] == pytest.approx(other.cables_mm[0], abs=1e-6)
+    assert state.nodes == pytest.approx(other.nodes, abs=1e-6)
+    assert solver.step(state, (-5.0,)).status is Status.CONVERGED
+
+
+def test_a_cable_that_cannot_be_paid_out_holds_the_robot_or_there_is_no_rest():
+    robot = Robot.prototype(loads=(Load(node=18, force=(-0.2, 0.0)),))
+    needed = rest(robot, np.inf, "plane").tensions[0]
+    for share in np.linspace(0.97, 0.9999, 21).tolist():
+        with pytest.raises(ValueError, match=r"max_tension is .*, its cables paid out to 0 mm at most: raise max_t"):
+            rest(robot, share * needed, "plane")
+    batch, weak = BatchSolver(robot, 2, 0), replace(robot, max_tension=0.99 * needed)
+    batch.assign(0, Scene(), weak)
+    batch.assign(1, Scene())
+    with pytest.raises(ValueError, match="at rest the loads of the robot cannot all be carried"):
+        batch.rest([0, 1])
+    with pytest.raises(ValueError, match="before it moves"):
+        batch.step(np.zeros(2))
+    batch.step(np.ones(1), [1])
+    assert batch.equilibrium(1).status is Status.CONVERGED
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_rest_where_paying_out_as_far_as_allowed_does_not_help(kind):
+    robot = replace(loaded("prototype", kind), max_cable_mm=0.1, cables=(Cable(), Cable(angle=np.pi)))
+    with pytest.raises(ValueError, match=r"its cables paid out to -0\.1 mm at most"):
+        rest(robot, 0.1 * rest(robot, np.inf, kind).tensions.max(), kind)

@@ -268,7 +268,9 @@ def test_robots_whose_rest_was_cut_short_do_not_move_until_they_rest(monkeypatch
         with pytest.raises(KeyboardInterrupt):
             batch.rest([1])
     for use in (lambda: batch.move(1), lambda: batch.equilibrium(1), lambda: batch.step(np.full(3, 9.5))):
-        with pytest.raises(ValueError, match=r"its rest was interrupted; call rest\(\[1\]\) before it moves"):
+        with pytest.raises(
+            ValueError, match=r"its rest was interrupted or refused; call rest\(\[1\]\) before it moves"
+        ):
             use()
     batch.rest([1])
     batch.step(np.full(3, 9.0))

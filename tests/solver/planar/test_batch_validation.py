@@ -25,7 +25,7 @@ def test_a_robot_put_among_other_obstacles_rests_before_it_moves(batch, circles)
     batch.step(np.full(4, 8.0))
     before = batch.blocks.copy()
     batch.assign(3, circles((41, 104, 15)))
-    message = r"robot 3 has a new scene, or its rest was interrupted; call rest\(\[3\]\) before it moves"
+    message = r"robot 3 has a new scene, or its rest was interrupted or refused; call rest\(\[3\]\) before it moves"
     for move in (
         lambda: batch.step(np.full(4, 8.0)),
         lambda: batch.step(np.full(1, 8.0), [3]),
@@ -51,7 +51,7 @@ def test_a_robot_put_among_other_obstacles_rests_before_it_moves(batch, circles)
 @pytest.mark.parametrize("scene", [(), ((44, 104, 15), (60, 140, 12)), ((15, 100, 15),)])
 def test_a_scene_that_a_batch_refuses_changes_nothing(batch, circles, scene):
     kept = batch.scene(2)
-    with pytest.raises(ValueError, match=r"each of the batch.s has|overlaps the straight robot"):
+    with pytest.raises(ValueError, match=r"each of the batch.s has|overlaps the unstressed robot"):
         batch.assign(2, circles(*scene))
     assert batch.scene(2) is kept
     assert batch.assign_if_clear(2, kept)

@@ -62,7 +62,7 @@ def test_released_robot_is_straight(circles):
 
 
 def test_refuses_what_the_solver_refuses(circles):
-    with pytest.raises(ValueError, match="overlaps the straight robot"):
+    with pytest.raises(ValueError, match="overlaps the unstressed robot"):
         ReferenceSolver(Robot.prototype(model="paper"), circles((10, 80, 12)))
     reference = ReferenceSolver(Robot.prototype(model="paper"), circles(*SCENE))
     with pytest.raises(ValueError, match="cable_mm is nan"):

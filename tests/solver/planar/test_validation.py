@@ -27,9 +27,9 @@ from solver.spatial import SpatialRobot, Sphere
     [
         (
             Circle(center=(10, 80), radius=12),
-            r"Circle\(.*center=\(10.0, 80.0\), radius=12.0\) overlaps the straight robot by .* mm at node",
+            r"Circle\(.*center=\(10.0, 80.0\), radius=12.0\) overlaps the unstressed robot by .* mm at node",
         ),
-        (HalfPlane(point=(7, 0), normal=(-1, 0)), "HalfPlane.* overlaps the straight robot by 1 mm"),
+        (HalfPlane(point=(7, 0), normal=(-1, 0)), "HalfPlane.* overlaps the unstressed robot by 1 mm"),
         (
             HalfPlane(point=(30, 0), normal=(-1, 0), nodes=(19,)),
             "HalfPlane names node 19; the robot's nodes are 0 to 18",

@@ -260,7 +260,7 @@ def test_a_pull_towards_a_sphere_reaches_a_force(robot):
             lambda: SpatialSolver(
                 SpatialRobot.prototype(model="paper"), Scene([Sphere(center=(10, 0, 90), radius=12)])
             ),
-            "overlaps the straight robot",
+            "overlaps the unstressed robot",
         ),
         (
             lambda: SpatialSolver(SpatialRobot.prototype(model="paper"), Scene([Sphere(center=(40, 0, 90), radius=3)])),

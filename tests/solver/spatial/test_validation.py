@@ -161,7 +161,7 @@ def test_a_robot_put_among_other_obstacles_rests_before_it_moves(robot):
     batch.rest([0, 1])
     batch.step(np.full((2, 2), 5))
     batch.assign(1, Scene([Sphere(center=(48, 0, 110), radius=15)]))
-    message = r"robot 1 has a new scene, or its rest was interrupted; call rest\(\[1\]\) before it moves"
+    message = r"robot 1 has a new scene, or its rest was interrupted or refused; call rest\(\[1\]\) before it moves"
     with pytest.raises(ValueError, match=message):
         batch.step(np.full((2, 2), 5.0))
     for commands in (np.full(2, 5.0), np.full((2, 2), 13.0), np.full((2, 3), 1.0)):
