@@ -18,6 +18,8 @@ PLAY_ERROR = 0.001  # standard deviation of a seen command that neither noise no
 RIGIDITY_ERROR = 0.01  # standard deviation of the nominal tension, over the tension
 LOSS_ERROR = 0.003  # likewise, of the share of friction
 LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
+SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
+SHARE_CHANGE = 0.5  # likewise, over its change in a step
 MODEL_ERROR = 0.1  # standard deviation of virtual work over the force: other points move than those of a free robot
 
 
@@ -77,13 +79,15 @@ class RobotEstimator:
         self._offset = (self._seen_std / error) ** 2  # readings that the prior of the seen shape's error is worth
         shape = count, len(candidates.latencies), commands, len(candidates.plays)
         self._errors, self._squares, self._seen = np.zeros(shape), np.zeros(shape), np.zeros(count)
+        self._share = np.zeros(count)  # of the force, that the regulated obstacle had in the model
 
     def reset(self, index: EnvIndex = ALL) -> None:
         """Start new episodes of some robots."""
         self.loops.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
-        self._errors[index], self._squares[index], self._seen[index] = 0.0, 0.0, 0.0
+        for part in (self._errors, self._squares, self._seen, self._share):
+            part[index] = 0.0
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> Knowledge:
         """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them."""
@@ -99,7 +103,8 @@ class RobotEstimator:
         play = weights.sum(axis=2)
         force, variance = self._virtual_work(tensions, nominal, levers, weights, index)
         latency = _moments(self._candidates.latencies, delays)
-        force, force_std = self._force.update(observation, force, variance, latency[0], touching, index)
+        force, variance, pressing = self._on_target(force, variance, observation, touching, index)
+        force, force_std = self._force.update(observation, force, variance, latency[0], pressing, index)
         rigidity = self._tension.rigidity[index], self._tension.variance[index]
         mean = (weights * rigidity[0]).sum(axis=(1, 2))
         spread = (weights * (rigidity[1] + (rigidity[0] - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
@@ -151,6 +156,26 @@ class RobotEstimator:
         mean = (weights * forces).sum(axis=(1, 2))
         spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
         return mean, (weights * spread).sum(axis=(1, 2)) + (MODEL_ERROR * mean) ** 2
+
+
+    def _on_target(
+        self,
+        force: np.ndarray,
+        variance: np.ndarray,
+        observation: Mapping[str, np.ndarray],
+        touching: np.ndarray,
+        index: EnvIndex,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return mean and variance of the force on the regulated obstacle, and whether that touches, ``(k,)`` each.
+
+        The model says how several obstacles share the force, where the cables are as the encoders read them.
+        """
+        if "share" not in observation:
+            return force, variance, touching
+        share = observation["share"][:, 0].astype(float)
+        error = SHARE_ERROR**2 * share * (1 - share) + SHARE_CHANGE**2 * (share - self._share[index]) ** 2
+        self._share[index] = share
+        return share * force, share**2 * variance + error * force**2, touching & (share > 0)
 
 
 def _carried(free: np.ndarray, motors: np.ndarray, places: np.ndarray) -> np.ndarray:
