@@ -147,12 +147,12 @@ class RobotEstimator:
         """Return mean and variance of the force that virtual work tells, ``(k,)``."""
         filtered = self._tension
         factors, levers = filtered.factors(self.loops, index), levers[:, :, None, None]
-        lacking = (tensions[..., None, None] - filtered.zeros[index]) / factors
-        lacking = lacking - filtered.rigidity[index][:, None] * nominal[..., None]
+        robot, doubt = filtered.robot_tensions(tensions, index)
+        lacking = robot - filtered.rigidity[index][:, None] * nominal[..., None]
         size = np.maximum((levers**2).sum(axis=1), LEAST_LEVER**2)
         forces = np.maximum((levers * lacking).sum(axis=1) / size, 0.0)
         inner = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2
-        inner = inner + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
+        inner = inner + (levers**2 * doubt).sum(axis=1) + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
         mean = (weights * forces).sum(axis=(1, 2))
         spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
         return mean, (weights * spread).sum(axis=(1, 2)) + (MODEL_ERROR * mean) ** 2

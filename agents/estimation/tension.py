@@ -34,6 +34,7 @@ class TensionFilter:
         rigidity: Mean of the rigidity ratio for each, ``(N, B, E)``.
         variance: Its variance, ``(N, B, E)``.
         zeros: Means of the zeros, ``(N, c, B, E)`` [EI/(aL)].
+        inward: Probabilities that the cables last moved in, ``(N, c, B, E)``.
     """
 
     def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing) -> None:
@@ -49,7 +50,7 @@ class TensionFilter:
         self._onset = np.full(count, np.inf)  # size of the commands at the first contact [a]
         self._margin = 2 * float(candidates.plays[-1])
         self.rigidity, self.variance = np.full((2, count, *shape[2:]), RIGIDITY[0])
-        self.zeros = np.zeros(shape)
+        self.zeros, self.inward = np.zeros(shape), np.ones(shape)
         self.log_likelihood = np.zeros((count, *shape[2:]))
 
     def reset(self, index: EnvIndex) -> None:
@@ -57,6 +58,7 @@ class TensionFilter:
         self._sums[:, index] = self._lines[:, index] = 0.0
         for part in (self._squares, self._broken, self.zeros, self.log_likelihood):
             part[index] = 0.0
+        self.inward[index] = 1.0
         self._onset[index] = np.inf
         self.rigidity[index], self.variance[index] = RIGIDITY[0], RIGIDITY[1] ** 2
 
@@ -77,7 +79,7 @@ class TensionFilter:
         self._onset[index] = np.where(touching, np.minimum(self._onset[index], size), self._onset[index])
         free = ~touching & (size < self._onset[index] - self._margin)
         self._update_free(tensions, nominal, factors, free, index)
-        self._update_contact(tensions, places, factors, touching, index)
+        self._update_contact(tensions, places, loops, touching, index)
         self.log_likelihood[index] = self._evidence(index) + self._broken[index]
 
     def factors(self, loops: Loops, index: EnvIndex) -> np.ndarray:
@@ -108,25 +110,60 @@ class TensionFilter:
         misfit = cyy + prior * RIGIDITY[0] ** 2 - mean**2 * precision
         return np.asarray(COUNTED * (-0.5 * misfit / self.noise**2 - 0.5 * np.log(precision)))
 
+    def robot_tensions(self, tensions: np.ndarray, index: EnvIndex) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and variance of the tensions in the robots, as far as directions decide, ``(k, c, B, E)``."""
+        inside, outside = self._both_ways(tensions, index)
+        inward = self.inward[index]
+        return _mixed(inward, inside, outside), inward * (1 - inward) * (inside - outside) ** 2
+
+    def _both_ways(self, tensions: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return the tensions in the robots if the cables last moved in, and if they moved out, ``(2, k, c, B, E)``."""
+        motor = tensions[..., None, None] - self.zeros[index]
+        return np.stack([motor * self._kept, motor / self._kept])
+
     def _update_contact(
-        self, tensions: np.ndarray, places: np.ndarray, factors: np.ndarray, touching: np.ndarray, index: EnvIndex
+        self, tensions: np.ndarray, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
     ) -> None:
-        """Compare tensions in the robot with lines through the latest ones, and add them to these."""
-        robot = (tensions[..., None, None] - self.zeros[index]) / factors
-        at = np.broadcast_to(places[..., None], robot.shape)
+        """Compare tensions in the robot with lines through the latest ones, and add them to these.
+
+        Where it is open which way a cable last moved, the tensions of both directions are compared.
+        """
+        both, expected = self._both_ways(tensions, index), loops.inward(index)[..., None]
+        at = np.broadcast_to(places[..., None], both.shape[1:])
         count, sl, st, sll, slt = (total[index] for total in self._lines)
         spread = sll * count - sl * sl
         known = touching[:, None, None, None] & (spread > 1e-8 * count * count) & (count > 2)
         slope = np.where(known, (slt * count - sl * st) / np.where(known, spread, 1.0), 0.0)
         mean_l, mean_t = (total / np.maximum(count, 1e-9) for total in (sl, st))
-        error = robot - mean_t - slope * (at - mean_l)
         leverage = np.where(
             known, 1 / np.maximum(count, 1.0) + (at - mean_l) ** 2 * count / np.where(known, spread, 1.0), 0.0
         )
-        variance = (self.noise / factors) ** 2 * (1 + leverage) + (SLIP * robot) ** 2
-        broken = np.where(known, -0.5 * error**2 / variance - 0.5 * np.log(variance), 0.0).sum(axis=1)
-        self._broken[index] += TRUST * broken
+        noise = self.noise * np.stack([self._kept, 1 / self._kept])[:, None, None, None]
+        variance = noise**2 * (1 + leverage) + (SLIP * both) ** 2
+        error = both - mean_t - slope * (at - mean_l)
+        likely = np.where(known, -0.5 * error**2 / variance - 0.5 * np.log(variance), 0.0)
+        self.inward[index], broken = _judged(expected, likely)
+        self._broken[index] += TRUST * broken.sum(axis=1)
+        robot = _mixed(self.inward[index], *both)
         terms = (np.ones_like(robot), at, robot, at * at, at * robot)
         decay = np.where(touching, SMOOTHNESS, 1.0)[:, None, None, None]
         for total, term in zip(self._lines, terms, strict=True):
             total[index] = decay * total[index] + np.where(touching[:, None, None, None], term, 0.0)
+
+
+def _judged(expected: np.ndarray, likely: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the probability of the first of two cases, and the logarithm of the likelihood of both together.
+
+    Args:
+        expected: Probability of the first case before anything is seen.
+        likely: Logarithms of the likelihoods of what is seen in the cases, ``(2, ...)``.
+    """
+    with np.errstate(divide="ignore"):
+        joint = likely + np.log(np.stack(np.broadcast_arrays(expected, 1 - expected)))
+    together = np.logaddexp(*joint)
+    return np.exp(joint[0] - together), together
+
+
+def _mixed(share: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return a mean of two arrays, by the share of the first."""
+    return np.asarray(share * one + (1 - share) * other)
