@@ -21,6 +21,10 @@ LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull har
 SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
 SHARE_CHANGE = 0.5  # likewise, over its change in a step
 MODEL_ERROR = 0.1  # standard deviation of virtual work over the force: other points move than those of a free robot
+LARGE = 12.0  # force on the nominal robot, whose square the share is over that virtual work falls short [EI/L²]
+SHORT_ERROR = 0.5  # standard deviation of what it falls short by, over that
+LARGEST = 8.0  # such a force up to which this was measured [EI/L²]
+LEAST_RIGIDITY = 0.1  # rigidity ratio, below those that are sampled
 
 
 class Knowledge(NamedTuple):
@@ -71,8 +75,9 @@ class RobotEstimator:
         sensing = settings.sensors or EXACT
         candidates, commands = Candidates.of(sensing), settings.actuation.matrix.shape[1]
         self._candidates = candidates
+        limit = settings.robot.max_tension / settings.scales.tension_n
         self.loops = Loops(count, commands, candidates)
-        self._tension = TensionFilter(count, commands, candidates, sensing)
+        self._tension = TensionFilter(count, commands, candidates, sensing, limit)
         self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]), settings.force_span)
         self._seen_std = max(SEEN * float(np.mean(sensing.angle_noise)), LEAST_SEEN)
         error = max(SEEN * float(np.mean(sensing.angle_error)), LEAST_SEEN)
@@ -151,11 +156,19 @@ class RobotEstimator:
         lacking = robot - filtered.rigidity[index][:, None] * nominal[..., None]
         size = np.maximum((levers**2).sum(axis=1), LEAST_LEVER**2)
         forces = np.maximum((levers * lacking).sum(axis=1) / size, 0.0)
+        short = forces * self._shortfall(forces, filtered.rigidity[index])
+        forces = forces + short
         inner = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2
         inner = inner + (levers**2 * doubt).sum(axis=1) + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
         mean = (weights * forces).sum(axis=(1, 2))
         spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
-        return mean, (weights * spread).sum(axis=(1, 2)) + (MODEL_ERROR * mean) ** 2
+        model = (MODEL_ERROR * mean) ** 2 + (SHORT_ERROR * (weights * short).sum(axis=(1, 2))) ** 2
+        return mean, (weights * spread).sum(axis=(1, 2)) + model
+
+    def _shortfall(self, forces: np.ndarray, rigidity: np.ndarray) -> np.ndarray:
+        """Return what is missing of forces that virtual work tells, over these: they bend the robot away from the free one."""
+        nominal = forces / np.maximum(rigidity, LEAST_RIGIDITY) / self._actuation.sections**2
+        return np.asarray((np.minimum(nominal, LARGEST) / LARGE) ** 2)
 
 
     def _on_target(

@@ -17,6 +17,7 @@ SMOOTHNESS = 0.9  # weight of the past in the lines through tensions in contact,
 SLIP = 0.02  # standard deviation of a tension in contact from such a line, over the tension
 COUNTED = 0.5  # share of the evidence before contact that counts, as the nominal tension is only nearly known
 TRUST = 0.1  # share of the evidence in contact that counts, as errors of neighbouring steps are alike
+STALLED = 0.9  # tension over its limit, from which on a robot may have stalled
 LEAST = 1e-3  # of standard deviations, for candidates without noise [EI/(aL)]
 
 
@@ -28,6 +29,7 @@ class TensionFilter:
         commands: Number c of commands of a robot.
         candidates: The candidates.
         sensing: Ranges of the imperfections.
+        limit: Tension at which the nominal robot stalls [EI/(aL)].
 
     Attributes:
         log_likelihood: Of the candidates of backlash and friction, ``(N, B, E)``.
@@ -37,8 +39,8 @@ class TensionFilter:
         inward: Probabilities that the cables last moved in, ``(N, c, B, E)``.
     """
 
-    def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing) -> None:
-        self._kept = 1 - candidates.losses
+    def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float) -> None:
+        self._limit, self._kept = limit, 1 - candidates.losses
         self.noise = max(sensing.tension_noise[1], LEAST)
         zero = max(sensing.tension_zero[1] / np.sqrt(3), LEAST)
         self._prior = (self.noise / zero) ** 2  # readings that the prior of a zero is worth
@@ -121,6 +123,14 @@ class TensionFilter:
         motor = tensions[..., None, None] - self.zeros[index]
         return np.stack([motor * self._kept, motor / self._kept])
 
+    def _expected(self, both: np.ndarray, inward: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return the probabilities that cables last moved in before their tensions are seen, ``(k, c, B, E)``.
+
+        A robot that stalls does not follow its motor, and what it touches may have moved its cable either way.
+        """
+        stalled = np.abs(both[1]) > STALLED * self._limit * self.rigidity[index][:, None]
+        return np.where(stalled, 0.5, inward)
+
     def _update_contact(
         self, tensions: np.ndarray, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
     ) -> None:
@@ -128,7 +138,8 @@ class TensionFilter:
 
         Where it is open which way a cable last moved, the tensions of both directions are compared.
         """
-        both, expected = self._both_ways(tensions, index), loops.inward(index)[..., None]
+        both = self._both_ways(tensions, index)
+        expected = self._expected(both, loops.inward(index)[..., None], index)
         at = np.broadcast_to(places[..., None], both.shape[1:])
         count, sl, st, sll, slt = (total[index] for total in self._lines)
         spread = sll * count - sl * sl
