@@ -159,17 +159,20 @@ class RobotEstimator:
         short = forces * self._shortfall(forces, filtered.rigidity[index])
         forces = forces + short
         inner = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2
-        inner = inner + (levers**2 * doubt).sum(axis=1) + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
+        inner = inner + (levers**2 * doubt).sum(axis=1)
+        inner = inner + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
         mean = (weights * forces).sum(axis=(1, 2))
         spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
         model = (MODEL_ERROR * mean) ** 2 + (SHORT_ERROR * (weights * short).sum(axis=(1, 2))) ** 2
         return mean, (weights * spread).sum(axis=(1, 2)) + model
 
     def _shortfall(self, forces: np.ndarray, rigidity: np.ndarray) -> np.ndarray:
-        """Return what is missing of forces that virtual work tells, over these: they bend the robot away from the free one."""
+        """Return by which share virtual work falls short of forces.
+
+        It counts the motion of a free robot, and a force bends the robot away from that, by the square of the force.
+        """
         nominal = forces / np.maximum(rigidity, LEAST_RIGIDITY) / self._actuation.sections**2
         return np.asarray((np.minimum(nominal, LARGEST) / LARGE) ** 2)
-
 
     def _on_target(
         self,
