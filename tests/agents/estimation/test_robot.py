@@ -134,7 +134,9 @@ def test_with_ideal_sensing_the_force_is_what_the_sensor_reads():
     assert known.force == pytest.approx(read, abs=1e-6)
 
 
-@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/SpatialPush-v1", "CCR/InsertAndPush-v1"])
+@pytest.mark.parametrize(
+    "env_id", [f"CCR/{task}-v1" for task in ("PushObstacle", "SpatialPush", "InsertAndPush", "BracedPush")]
+)
 def test_robots_are_estimated_alike_together_and_alone_and_forgotten(env_id):
     envs = gymnasium.make_vec(env_id, 5, sensing="realistic", obs_mode="dict")
     settings, generator = envs.unwrapped.settings, np.random.default_rng(0)
