@@ -37,8 +37,9 @@ class Trials:
     """
 
     def __init__(self, task: AnyTask, settings: AnySettings, batch: BaseBatch, adapter: AnyAdapter) -> None:
-        self._task, self._settings, self._batch, self._adapter = task, settings, batch, adapter
+        self._task, self._batch, self._adapter = task, batch, adapter
         self._split, self._limit_mm = settings.split, _limit_mm(settings, adapter)
+        self._shown_n = settings.force_span * adapter.scales.force_n  # which is made anew at each access
         self._estimator = None
         if settings.regulate == "estimate":
             self._estimator = ForceEstimator(adapter, batch.count, batch.threads, learns=False)
@@ -77,7 +78,7 @@ class Trials:
         for _ in range(MAX_SAMPLES):
             own = {k: drawn[k].robot or self._batch.robot for k in waiting}
             sampled = {k: _sample_split(self._task, own[k], generators[k], self._split) for k in waiting}
-            clear = [k for k in waiting if self._place(robots[k], sampled[k].scene, drawn[k])]
+            clear = [k for k in waiting if self._batch.assign_if_clear(robots[k], sampled[k].scene, drawn[k].robot)]
             if not clear:
                 continue
             found, forces = self._pull(
@@ -94,13 +95,6 @@ class Trials:
             "cable and the tension limit; widen the task's ranges, or either limit"
         )
 
-    def _place(self, robot: int, scene: Scene, drawn: Drawn) -> bool:
-        """Put a robot among obstacles if they leave it clear, and return whether they do."""
-        clear = self._batch.leaves_clear(scene, drawn.robot)
-        if clear:
-            self._batch.assign(robot, scene, drawn.robot)
-        return clear
-
     def _pull(
         self, robots: list[int], assignments: list[Assignment], imperfections: list[Imperfections | None]
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -115,11 +109,10 @@ class Trials:
         else:
             increment = PULL * self._adapter.scales.travel_mm
             found, reached = self._batch.ramp_reaches_force(robots, wanted, increment, limit, pulls, self._task.target)
-        shown = self._settings.force_span * self._adapter.scales.force_n
         if not self._task.force_vector:
-            return found & (forces <= shown), forces[:, None]
+            return found & (forces <= self._shown_n), forces[:, None]
         goals = reached * (ratio / MARGIN)[:, None]
-        return found & (norm(goals) <= shown), goals
+        return found & (norm(goals) <= self._shown_n), goals
 
     def _pull_by_estimate(
         self, robots: list[int], wanted: np.ndarray, limit: float, bending: np.ndarray

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.common.checks import check_clear, check_scene
 from solver.common.equilibrium import BaseEquilibrium, RobotT_co
-from solver.common.geometry import touching_gaps
+from solver.common.geometry import StraightRobot
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
 from solver.common.rows import Motion, RowBatch
@@ -68,8 +68,8 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         threads = check_whole("threads", threads, 1, max(64, 4 * (os.cpu_count() or 1)), "more do not help")
         RowBatch.__init__(self, robot, count, self._make_layout(robot, obstacles), threads)
         self._work = self.statuses, self.iterations, self.factorizations
-        self._clear: tuple[Any, Scene] | None = None  # last robot, straight, found to be left clear by a scene
-        self._straight: dict[Any, np.ndarray] = {}  # points of the batch's robot, straight, and of the last other one
+        self._straight = self._straightened(robot)
+        self._last_straight = self._straight  # of the last robot that was put among obstacles
 
     @abstractmethod
     def _make_layout(self, robot: Any, obstacles: int) -> Layout:
@@ -101,22 +101,34 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
                 has changed then.
             TypeError: If ``scene`` is not a scene, or ``robot`` not one of the batch's space.
         """
+        if not self.assign_if_clear(index, scene, robot):
+            robot = robot or self.robot
+            check_clear(robot, scene, self._straight_of(robot).gaps(scene))
+
+    def assign_if_clear(self, index: int, scene: Scene, robot: RobotT_co | None = None) -> bool:
+        """Assign a scene as :meth:`assign` if no obstacle overlaps the straight robot, and return whether none does.
+
+        Raises:
+            ValueError: As :meth:`assign`, but for obstacles that overlap; nothing has changed then.
+            TypeError: As :meth:`assign`.
+        """
         index, own = self._check_index(index), None if robot == self.robot else robot
         check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
         if (own, scene) == (self._robots[index], self._scenes[index]):
-            return
+            return True
         changes = own != self._robots[index]
         if changes and own is not None:
             self._check_own(own)
         robot = own or self.robot
         compiled = self._compile(robot, scene)
-        if self._clear is None or robot is not self._clear[0] or scene is not self._clear[1]:
-            check_clear(robot, scene, self._straight_gaps(robot, scene))
+        if not self._straight_of(robot).is_clear_of(scene):
+            return False
         made = self._kernel_robot(own) if changes and own is not None else None
         with self._exclusive:
             self._put(index, scene, compiled)
             self._become(index, own, made)
             self._unrested.add(index)
+        return True
 
     def assign_alike(self, index: int, other: Self) -> None:
         """Assign the scene and the robot at an index of another batch of an equal robot, as :meth:`assign`, but faster.
@@ -130,19 +142,6 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         with self._exclusive:
             self._put(self._check_index(index), scene, other._compiled[index])
             self._unrested.add(index)
-
-    def leaves_clear(self, scene: Scene, robot: RobotT_co | None = None) -> bool:
-        """Return whether no obstacle of a scene overlaps the straight robot, that of the batch where none is given.
-
-        Raises:
-            ValueError: If an obstacle is of another space, or names a node that the robot does not have.
-            TypeError: If ``scene`` is not a scene.
-        """
-        check_instance("scene", scene, Scene, "put the obstacles in one, Scene([…])")
-        robot = robot or self.robot
-        clear = bool((self._straight_gaps(robot, scene) >= 0).all())
-        self._clear = (robot, scene) if clear else None
-        return clear
 
     def rest(self, robots: Sequence[int]) -> None:
         """Bring some robots to rest again, as ``rest()`` of their solver.
@@ -270,7 +269,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             ValueError: If a number or an index is out of range, an index is repeated, or a robot has no scene.
         """
         indices = self._check_assigned(robots)
-        count, most = len(indices), min((self.robot_of(index).cable_limit_mm for index in indices), default=math.inf)
+        count, most = len(indices), self._limits[indices, 1].min(initial=math.inf)
         forces = check_array("forces", forces, (count,), 0.0, LARGEST, "finite and not negative")
         limit = check_positive("limit_mm", limit_mm, high=most)
         increment = check_positive("increment_mm", increment_mm, limit / MAX_PULL_STEPS, LARGEST)
@@ -279,10 +278,9 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         given = check_array("directions", given, (count, self.cables), least, 1.0, f"from {least:g} to 1")
         target = -1 if obstacle is None else check_whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
         reached = np.zeros((count, self.space))
-        lengths = [self.robot_of(index).length_mm for index in indices]
         with self._exclusive:
             found = self._kernel_batch.ramps_reach_forces(
-                indices, forces, target, given, increment, limit, lengths, reached
+                indices, forces, target, given, increment, limit, self._lengths_mm(indices), reached
             )
         return np.array(found, bool), reached
 
@@ -302,17 +300,23 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         block, status = self.blocks[index].copy(), Status(self.statuses[index])
         return self._make_equilibrium(self.robot_of(index), scene, block, status, *work)
 
-    def _straight_gaps(self, robot: Any, scene: Scene) -> np.ndarray:
-        points = self._straight.get(robot)
-        if points is None:
-            points = np.ascontiguousarray(self._straight_points(robot))
-            self._straight = {kept: self._straight[kept] for kept in (self.robot,) if kept in self._straight}
-            self._straight[robot] = points
-        return touching_gaps(robot, scene, points)
+    def _straight_of(self, robot: Any) -> StraightRobot:
+        """Return a robot straight, kept for the batch's robot and the last other one."""
+        if robot is self.robot:
+            return self._straight
+        if robot is not self._last_straight.robot:
+            self._last_straight = self._straightened(robot)
+        return self._last_straight
+
+    def _straightened(self, robot: Any) -> StraightRobot:
+        return StraightRobot.of(robot, self._straight_points(robot))
+
+    def _lengths_mm(self, robots: list[int]) -> list[float]:
+        """Return the lengths at rest of some robots [mm]."""
+        return [(self._robots[robot] or self.robot).length_mm for robot in robots]
 
     def _rest(self, robots: list[int]) -> None:
-        lengths = [self.robot_of(robot).length_mm for robot in robots]
-        self._kernel_batch.rest(robots, lengths, self.blocks, *self._work)
+        self._kernel_batch.rest(robots, self._lengths_mm(robots), self.blocks, *self._work)
 
     def _move_among(self, robots: list[int], motions: list[Motion]) -> None:
         """Move robots, some of them while their obstacles move."""

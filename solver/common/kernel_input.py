@@ -43,7 +43,7 @@ def kernel_obstacles(robot: AnyRobot, scene: Scene) -> list[KernelObstacle]:
 def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> KernelObstacle:
     extent = obstacle.extent
     return KernelObstacle(
-        shape=SHAPES[obstacle.kind],
+        shape=SHAPES[law.kind],
         parameters=np.array(obstacle.parameters, dtype=float),
         center=extent.center,
         radius=extent.radius,
@@ -51,7 +51,7 @@ def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> 
         inradius=extent.inradius,
         outline=np.ascontiguousarray(obstacle.surface),
         touchable=touchable,
-        spring=obstacle.spring_matrix.astype(float),
+        spring=obstacle.spring_matrix,
         law=function_address(gap_function(law)) if law.kind == "custom" else 0,
     )
 

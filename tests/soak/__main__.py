@@ -7,9 +7,9 @@ import random
 import sys
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from agents.workers import worker_pool
 from soak.cases import find, shrink
 from soak.episodes import Episode, play
 from soak.report import Tally, table
@@ -71,7 +71,7 @@ def main():
         sys.exit(_replay(*options.case))
     report = Report(options.out, options.models)
     episodes = report.begin(_episodes(options), options.resume)
-    with ProcessPoolExecutor(options.processes) as pool:
+    with worker_pool(options.processes) as pool:
         played = zip(episodes, pool.map(play, episodes, chunksize=4), strict=True)
         for count, (episode, (tally, found)) in enumerate(played, 1):
             report.add(episode, tally, found)

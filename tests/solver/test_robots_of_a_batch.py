@@ -193,9 +193,17 @@ def test_limits_are_those_of_each_robot():
         batch.step(np.array([5.0, 8.0]))
     with pytest.raises(ValueError, match="limit_mm is 8"):
         batch.ramp_reaches_force([0, 1], np.ones(2), 0.5, 8.0)
-    assert batch.leaves_clear(Scene([Circle(center=(0.0, 190.0), radius=9.0)]))
-    longer = replace(KINDS["rod"], length_mm=185.0)
-    assert not batch.leaves_clear(Scene([Circle(center=(0.0, 190.0), radius=9.0)]), longer)
+
+
+def test_scenes_are_assigned_where_they_leave_the_robot_clear():
+    scene, ahead = (Scene([Circle(center=center, radius=9.8)]) for center in ((60.0, 100.0), (0.0, 191.0)))
+    batch, longer = batch_of("rod", [KINDS["rod"]], [scene], 1), replace(KINDS["rod"], length_mm=185.0)
+    assert not batch.assign_if_clear(0, ahead, longer)
+    assert batch.scene(0) is scene
+    assert batch.robot_of(0) == KINDS["rod"]
+    assert batch.assign_if_clear(0, ahead)
+    assert batch.scene(0) is ahead
+    batch.rest([0])
 
 
 @pytest.mark.parametrize("kind", ["rod", "rod in space"])

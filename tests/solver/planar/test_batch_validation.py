@@ -54,8 +54,9 @@ def test_a_scene_that_a_batch_refuses_changes_nothing(batch, circles, scene):
     with pytest.raises(ValueError, match=r"each of the batch.s has|overlaps the straight robot"):
         batch.assign(2, circles(*scene))
     assert batch.scene(2) is kept
-    assert batch.leaves_clear(kept)
-    assert not batch.leaves_clear(circles((15, 100, 15)))
+    assert batch.assign_if_clear(2, kept)
+    assert not batch.assign_if_clear(2, circles((15, 100, 15)))
+    assert batch.scene(2) is kept
     batch.step(np.full(4, 5.0))
 
 

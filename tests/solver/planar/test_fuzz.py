@@ -249,7 +249,7 @@ def test_batches(spatially, first, second, third):
     for call in (
         lambda: batch.assign(first, second),
         lambda: batch.assign(0, second),
-        lambda: batch.leaves_clear(first),
+        lambda: batch.assign_if_clear(first, second),
         lambda: batch.rest(first),
         lambda: batch.step(first),
         lambda: batch.step(cables[:1], second),
