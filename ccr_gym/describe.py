@@ -31,6 +31,7 @@ def describe(task: AnyTask, title: str, description: str, start: str, *, action:
     """
     settings = task.adapter.settings_class()
     adapter = task.adapter(settings, task.adapter.make_batch(settings, 1, task.obstacles, 1).layout)
+    share = "" if task.target is None else f", and `share`, how much of its contact forces is on obstacle {task.target}"
     parts = {
         "Description": description,
         "Action Space": _actions(adapter, action),
@@ -42,7 +43,7 @@ def describe(task: AnyTask, title: str, description: str, start: str, *, action:
 
             Without a force sensor the keys `force_error` and `force_measured` are absent. Where sensing is not ideal
             there are `tension`, of each cable as a load cell at its motor reads it, and `free_tension` and `lever` of
-            the nominal model; with `randomize` there is `robot`.
+            the nominal model{share}; with `randomize` there is `robot`.
 
             With `obs_mode="goal"` this row is `observation`, beside `desired_goal`, the set-point, and `achieved_goal`,
             the regulated force without errors of sensors: the reward follows from it, and no policy that is to run on

@@ -5,7 +5,7 @@ Single and vector environments are both shells around an :class:`EpisodeBatch`, 
 
 import numpy as np
 
-from ccr_gym.estimation import Measured
+from ccr_gym.estimation import TINY, Measured
 from ccr_gym.goals import compute_reward
 from ccr_gym.observation import Known, Observation
 from ccr_gym.quantities import Quantity, as_scalar, norm, operations
@@ -86,11 +86,19 @@ class EpisodeBatch(Transition):
         if self._sensors is not None:
             estimator = self._estimator
             contact, levers = self._layout.flags(self.model.blocks[index]), estimator.levers[index]
-            known = Known(contact, self._tensions[index], estimator.free_forces[index], levers)
+            share = self._target_share(self.model.blocks[index])
+            known = Known(contact, self._tensions[index], estimator.free_forces[index], levers, share)
             self.observer.write_sensed(rows, known, self._sensors.pose_errors(self._time, index))
             rows = self._sensors.apply_latency(rows, self._time, index)
         self.observer.write_encoders(rows, self._encoders(index))
         return self.observer.clip(rows)
+
+    def _target_share(self, blocks: np.ndarray) -> Quantity:
+        """Return the share of the contact forces that is on the regulated obstacle, 0 where nothing touches."""
+        if self._target is None:
+            return 1.0
+        sizes = norm(self._layout.forces(blocks))
+        return np.asarray(sizes[..., self._target] / np.maximum(sizes.sum(axis=-1), TINY))
 
     def shaped(self, rows: np.ndarray, reading: ForceReading) -> Observation:
         """Return flat observations in the form that the settings ask for."""

@@ -15,7 +15,7 @@ from ccr_gym.task import AnyTask
 
 Observation = np.ndarray | dict[str, np.ndarray]
 SENSOR_KEYS = ("force_error", "force_measured")  # absent without a force sensor
-NOT_NEGATIVE = ("length", "desired_ahead", "contact")
+NOT_NEGATIVE = ("length", "desired_ahead", "contact", "share")
 ENCODER_KEYS = ("cable", "length")  # what the encoders read, in the order of the actions
 
 
@@ -27,12 +27,14 @@ class Known(NamedTuple):
         tensions: Measured tensions, ``(..., c)`` [N].
         free_forces: As of :class:`ccr_gym.estimation.ForceEstimator`, ``(..., commands)`` [N].
         levers: Likewise, ``(..., commands)``.
+        share: Share of the model's contact forces that is on the regulated obstacle, 0 where nothing touches.
     """
 
     contact: np.ndarray
     tensions: np.ndarray
     free_forces: np.ndarray
     levers: np.ndarray
+    share: Quantity
 
 
 class Observer:
@@ -126,6 +128,8 @@ class Observer:
         entries["tension"][...] = known.tensions / self._tension_n
         entries["free_tension"][...] = known.free_forces / self._tension_n
         entries["lever"][...] = known.levers * self._lever_scale
+        if "share" in entries:
+            entries["share"][..., 0] = known.share
         self._disturb_pose(entries, errors)
 
     def clip(self, rows: np.ndarray) -> np.ndarray:
@@ -173,6 +177,8 @@ def _input_sizes(adapter: AnyAdapter, task: AnyTask) -> dict[str, int]:
     if adapter.settings.sensors:
         sizes["tension"] = len(adapter.settings.robot.cables)
         sizes["free_tension"] = sizes["lever"] = adapter.actions.commands
+        if task.target is not None:
+            sizes["share"] = 1
     if adapter.obstacle_size:
         sizes["obstacle"] = adapter.obstacle_size
     if adapter.settings.randomize and adapter.settings.randomize.observed:

@@ -117,7 +117,7 @@ class BracedPush(Task[Robot]):
     Attributes:
         brace: Ranges of x, y and radius of the lower one [L].
         goal: Ranges of x, y and radius of the upper one, whose contact force is regulated [L].
-        force: Range of the set-point [EI/L²].
+        force: Range of the set-point, that of the load cell: errors of sensors do not grow with it [EI/L²].
     """
 
     obstacles: ClassVar[int] = 2
@@ -125,7 +125,7 @@ class BracedPush(Task[Robot]):
 
     brace: tuple[Range, ...] = checked(((0.15, 0.21), (0.42, 0.53), (0.056, 0.078)), check_ranges, bounds=CIRCLE)
     goal: tuple[Range, ...] = checked(((0.29, 0.4), (0.69, 0.83), (0.067, 0.09)), check_ranges, bounds=CIRCLE)
-    force: Range = checked((0.4, 2.3), check_force_range)
+    force: Range = checked((0.2, 1.5), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """Return two circles and a set-point."""
@@ -203,6 +203,7 @@ class InsertAndPush(PushObstacle):
 
     y: Range = checked((0.47, 0.8), check_range)
     radius: Range = checked((0.064, 0.1), check_range, low=SMALLEST)
+    force: Range = checked((0.2, 1.5), check_force_range)  # as BracedPush
 
 
 @dataclass(frozen=True, slots=True)

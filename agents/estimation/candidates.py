@@ -3,11 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from agents.environment import EnvIndex
 from ccr_gym import Sensing
 
 PLAYS, LOSSES = 9, 13  # candidates of the backlash and of the share of friction
+FINE = 8  # backlashes between two candidates, for which way a cable moved
+NEAR = 12  # of these to either side of a candidate, that it stands for
 ALL = slice(None)
 
 
@@ -53,8 +56,11 @@ class Loops:
 
     def __init__(self, count: int, commands: int, candidates: Candidates) -> None:
         self._plays, steps = candidates.plays, int(candidates.latencies[-1]) + 1
+        self._fine = _refined(candidates.plays)
         self.places = np.zeros((count, steps, commands, len(candidates.plays)))
         self.moved_in = np.ones((count, commands, len(candidates.plays)), bool)
+        self._fine_places = np.zeros((count, commands, len(self._fine)))
+        self._fine_in = np.ones(self._fine_places.shape, bool)
         self._fresh = np.ones(count, bool)
 
     def reset(self, index: EnvIndex) -> None:
@@ -65,10 +71,40 @@ class Loops:
         """Take in the next positions of motors, ``(k, c)`` [a]."""
         motors, fresh = motors[:, :, None], self._fresh[index]
         places = np.where(fresh[:, None, None, None], motors[:, None], self.places[index])
-        before = places[:, 0]
-        now = np.clip(before, motors - self._plays, motors + self._plays)
-        moved = (now - before) * np.where(now < 0, -1.0, 1.0)
-        was_in = self.moved_in[index] | fresh[:, None, None]
-        self.moved_in[index] = np.where(np.abs(moved) > 1e-12, moved > 0, was_in)
+        was_in = fresh[:, None, None]
+        now, self.moved_in[index] = _followed(places[:, 0], motors, self._plays, self.moved_in[index] | was_in)
+        self._follow_closely(motors, index)
         self.places[index] = np.concatenate([now[:, None], places[:, :-1]], axis=1)
         self._fresh[index] = False
+
+    def inward(self, index: EnvIndex) -> np.ndarray:
+        """Return the probabilities that cables last moved in, as far as the motors tell, ``(k, c, B)``.
+
+        A candidate stands for all backlashes nearby. Where a motor rests just at an end of one of them, they disagree
+        about whether the cable has moved.
+        """
+        if len(self._plays) == 1:
+            return self.moved_in[index].astype(float)
+        around = np.pad(self._fine_in[index], [(0, 0), (0, 0), (NEAR, NEAR)], mode="edge")
+        return np.asarray(sliding_window_view(around, 2 * NEAR + 1, axis=-1)[..., ::FINE, :].mean(axis=-1))
+
+    def _follow_closely(self, motors: np.ndarray, index: EnvIndex) -> None:
+        """Follow cables with backlashes between the candidates."""
+        fresh = self._fresh[index][:, None, None]
+        before = np.where(fresh, motors, self._fine_places[index])
+        followed = _followed(before, motors, self._fine, self._fine_in[index] | fresh)
+        self._fine_places[index], self._fine_in[index] = followed
+
+
+def _followed(
+    places: np.ndarray, motors: np.ndarray, plays: np.ndarray, moved_in: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where motors leave cables, and whether these last moved in, ``(k, c, B)`` each."""
+    now = np.clip(places, motors - plays, motors + plays)
+    moved = (now - places) * np.where(now < 0, -1.0, 1.0)
+    return now, np.where(np.abs(moved) > 1e-12, moved > 0, moved_in)
+
+
+def _refined(plays: np.ndarray) -> np.ndarray:
+    """Return the candidates, and backlashes evenly spaced between them."""
+    return np.linspace(plays[0], plays[-1], (len(plays) - 1) * FINE + 1)

@@ -18,7 +18,13 @@ PLAY_ERROR = 0.001  # standard deviation of a seen command that neither noise no
 RIGIDITY_ERROR = 0.01  # standard deviation of the nominal tension, over the tension
 LOSS_ERROR = 0.003  # likewise, of the share of friction
 LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
+SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
+SHARE_CHANGE = 0.5  # likewise, over its change in a step
 MODEL_ERROR = 0.1  # standard deviation of virtual work over the force: other points move than those of a free robot
+LARGE = 12.0  # force on the nominal robot, whose square the share is over that virtual work falls short [EI/L²]
+SHORT_ERROR = 0.5  # standard deviation of what it falls short by, over that
+LARGEST = 8.0  # such a force up to which this was measured [EI/L²]
+LEAST_RIGIDITY = 0.1  # rigidity ratio, below those that are sampled
 
 
 class Knowledge(NamedTuple):
@@ -69,21 +75,24 @@ class RobotEstimator:
         sensing = settings.sensors or EXACT
         candidates, commands = Candidates.of(sensing), settings.actuation.matrix.shape[1]
         self._candidates = candidates
+        limit = settings.robot.max_tension / settings.scales.tension_n
         self.loops = Loops(count, commands, candidates)
-        self._tension = TensionFilter(count, commands, candidates, sensing)
+        self._tension = TensionFilter(count, commands, candidates, sensing, limit)
         self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]), settings.force_span)
         self._seen_std = max(SEEN * float(np.mean(sensing.angle_noise)), LEAST_SEEN)
         error = max(SEEN * float(np.mean(sensing.angle_error)), LEAST_SEEN)
         self._offset = (self._seen_std / error) ** 2  # readings that the prior of the seen shape's error is worth
         shape = count, len(candidates.latencies), commands, len(candidates.plays)
         self._errors, self._squares, self._seen = np.zeros(shape), np.zeros(shape), np.zeros(count)
+        self._share = np.zeros(count)  # of the force, that the regulated obstacle had in the model
 
     def reset(self, index: EnvIndex = ALL) -> None:
         """Start new episodes of some robots."""
         self.loops.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
-        self._errors[index], self._squares[index], self._seen[index] = 0.0, 0.0, 0.0
+        for part in (self._errors, self._squares, self._seen, self._share):
+            part[index] = 0.0
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> Knowledge:
         """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them."""
@@ -99,7 +108,8 @@ class RobotEstimator:
         play = weights.sum(axis=2)
         force, variance = self._virtual_work(tensions, nominal, levers, weights, index)
         latency = _moments(self._candidates.latencies, delays)
-        force, force_std = self._force.update(observation, force, variance, latency[0], touching, index)
+        force, variance, pressing = self._on_target(force, variance, observation, touching, index)
+        force, force_std = self._force.update(observation, force, variance, latency[0], pressing, index)
         rigidity = self._tension.rigidity[index], self._tension.variance[index]
         mean = (weights * rigidity[0]).sum(axis=(1, 2))
         spread = (weights * (rigidity[1] + (rigidity[0] - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
@@ -142,15 +152,46 @@ class RobotEstimator:
         """Return mean and variance of the force that virtual work tells, ``(k,)``."""
         filtered = self._tension
         factors, levers = filtered.factors(self.loops, index), levers[:, :, None, None]
-        lacking = (tensions[..., None, None] - filtered.zeros[index]) / factors
-        lacking = lacking - filtered.rigidity[index][:, None] * nominal[..., None]
+        robot, doubt = filtered.robot_tensions(tensions, index)
+        lacking = robot - filtered.rigidity[index][:, None] * nominal[..., None]
         size = np.maximum((levers**2).sum(axis=1), LEAST_LEVER**2)
         forces = np.maximum((levers * lacking).sum(axis=1) / size, 0.0)
+        short = forces * self._shortfall(forces, filtered.rigidity[index])
+        forces = forces + short
         inner = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2
+        inner = inner + (levers**2 * doubt).sum(axis=1)
         inner = inner + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
         mean = (weights * forces).sum(axis=(1, 2))
         spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
-        return mean, (weights * spread).sum(axis=(1, 2)) + (MODEL_ERROR * mean) ** 2
+        model = (MODEL_ERROR * mean) ** 2 + (SHORT_ERROR * (weights * short).sum(axis=(1, 2))) ** 2
+        return mean, (weights * spread).sum(axis=(1, 2)) + model
+
+    def _shortfall(self, forces: np.ndarray, rigidity: np.ndarray) -> np.ndarray:
+        """Return by which share virtual work falls short of forces.
+
+        It counts the motion of a free robot, and a force bends the robot away from that, by the square of the force.
+        """
+        nominal = forces / np.maximum(rigidity, LEAST_RIGIDITY) / self._actuation.sections**2
+        return np.asarray((np.minimum(nominal, LARGEST) / LARGE) ** 2)
+
+    def _on_target(
+        self,
+        force: np.ndarray,
+        variance: np.ndarray,
+        observation: Mapping[str, np.ndarray],
+        touching: np.ndarray,
+        index: EnvIndex,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return mean and variance of the force on the regulated obstacle, and whether that touches, ``(k,)`` each.
+
+        The model says how several obstacles share the force, where the cables are as the encoders read them.
+        """
+        if "share" not in observation:
+            return force, variance, touching
+        share = observation["share"][:, 0].astype(float)
+        error = SHARE_ERROR**2 * share * (1 - share) + SHARE_CHANGE**2 * (share - self._share[index]) ** 2
+        self._share[index] = share
+        return share * force, share**2 * variance + error * force**2, touching & (share > 0)
 
 
 def _carried(free: np.ndarray, motors: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ SMOOTHNESS = 0.9  # weight of the past in the lines through tensions in contact,
 SLIP = 0.02  # standard deviation of a tension in contact from such a line, over the tension
 COUNTED = 0.5  # share of the evidence before contact that counts, as the nominal tension is only nearly known
 TRUST = 0.1  # share of the evidence in contact that counts, as errors of neighbouring steps are alike
+STALLED = 0.9  # tension over its limit, from which on a robot may have stalled
 LEAST = 1e-3  # of standard deviations, for candidates without noise [EI/(aL)]
 
 
@@ -28,16 +29,18 @@ class TensionFilter:
         commands: Number c of commands of a robot.
         candidates: The candidates.
         sensing: Ranges of the imperfections.
+        limit: Tension at which the nominal robot stalls [EI/(aL)].
 
     Attributes:
         log_likelihood: Of the candidates of backlash and friction, ``(N, B, E)``.
         rigidity: Mean of the rigidity ratio for each, ``(N, B, E)``.
         variance: Its variance, ``(N, B, E)``.
         zeros: Means of the zeros, ``(N, c, B, E)`` [EI/(aL)].
+        inward: Probabilities that the cables last moved in, ``(N, c, B, E)``.
     """
 
-    def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing) -> None:
-        self._kept = 1 - candidates.losses
+    def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float) -> None:
+        self._limit, self._kept = limit, 1 - candidates.losses
         self.noise = max(sensing.tension_noise[1], LEAST)
         zero = max(sensing.tension_zero[1] / np.sqrt(3), LEAST)
         self._prior = (self.noise / zero) ** 2  # readings that the prior of a zero is worth
@@ -49,7 +52,7 @@ class TensionFilter:
         self._onset = np.full(count, np.inf)  # size of the commands at the first contact [a]
         self._margin = 2 * float(candidates.plays[-1])
         self.rigidity, self.variance = np.full((2, count, *shape[2:]), RIGIDITY[0])
-        self.zeros = np.zeros(shape)
+        self.zeros, self.inward = np.zeros(shape), np.ones(shape)
         self.log_likelihood = np.zeros((count, *shape[2:]))
 
     def reset(self, index: EnvIndex) -> None:
@@ -57,6 +60,7 @@ class TensionFilter:
         self._sums[:, index] = self._lines[:, index] = 0.0
         for part in (self._squares, self._broken, self.zeros, self.log_likelihood):
             part[index] = 0.0
+        self.inward[index] = 1.0
         self._onset[index] = np.inf
         self.rigidity[index], self.variance[index] = RIGIDITY[0], RIGIDITY[1] ** 2
 
@@ -77,7 +81,7 @@ class TensionFilter:
         self._onset[index] = np.where(touching, np.minimum(self._onset[index], size), self._onset[index])
         free = ~touching & (size < self._onset[index] - self._margin)
         self._update_free(tensions, nominal, factors, free, index)
-        self._update_contact(tensions, places, factors, touching, index)
+        self._update_contact(tensions, places, loops, touching, index)
         self.log_likelihood[index] = self._evidence(index) + self._broken[index]
 
     def factors(self, loops: Loops, index: EnvIndex) -> np.ndarray:
@@ -108,25 +112,69 @@ class TensionFilter:
         misfit = cyy + prior * RIGIDITY[0] ** 2 - mean**2 * precision
         return np.asarray(COUNTED * (-0.5 * misfit / self.noise**2 - 0.5 * np.log(precision)))
 
+    def robot_tensions(self, tensions: np.ndarray, index: EnvIndex) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and variance of the tensions in the robots, as far as directions decide, ``(k, c, B, E)``."""
+        inside, outside = self._both_ways(tensions, index)
+        inward = self.inward[index]
+        return _mixed(inward, inside, outside), inward * (1 - inward) * (inside - outside) ** 2
+
+    def _both_ways(self, tensions: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return the tensions in the robots if the cables last moved in, and if they moved out, ``(2, k, c, B, E)``."""
+        motor = tensions[..., None, None] - self.zeros[index]
+        return np.stack([motor * self._kept, motor / self._kept])
+
+    def _expected(self, both: np.ndarray, inward: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return the probabilities that cables last moved in before their tensions are seen, ``(k, c, B, E)``.
+
+        A robot that stalls does not follow its motor, and what it touches may have moved its cable either way.
+        """
+        stalled = np.abs(both[1]) > STALLED * self._limit * self.rigidity[index][:, None]
+        return np.where(stalled, 0.5, inward)
+
     def _update_contact(
-        self, tensions: np.ndarray, places: np.ndarray, factors: np.ndarray, touching: np.ndarray, index: EnvIndex
+        self, tensions: np.ndarray, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
     ) -> None:
-        """Compare tensions in the robot with lines through the latest ones, and add them to these."""
-        robot = (tensions[..., None, None] - self.zeros[index]) / factors
-        at = np.broadcast_to(places[..., None], robot.shape)
+        """Compare tensions in the robot with lines through the latest ones, and add them to these.
+
+        Where it is open which way a cable last moved, the tensions of both directions are compared.
+        """
+        both = self._both_ways(tensions, index)
+        expected = self._expected(both, loops.inward(index)[..., None], index)
+        at = np.broadcast_to(places[..., None], both.shape[1:])
         count, sl, st, sll, slt = (total[index] for total in self._lines)
         spread = sll * count - sl * sl
         known = touching[:, None, None, None] & (spread > 1e-8 * count * count) & (count > 2)
         slope = np.where(known, (slt * count - sl * st) / np.where(known, spread, 1.0), 0.0)
         mean_l, mean_t = (total / np.maximum(count, 1e-9) for total in (sl, st))
-        error = robot - mean_t - slope * (at - mean_l)
         leverage = np.where(
             known, 1 / np.maximum(count, 1.0) + (at - mean_l) ** 2 * count / np.where(known, spread, 1.0), 0.0
         )
-        variance = (self.noise / factors) ** 2 * (1 + leverage) + (SLIP * robot) ** 2
-        broken = np.where(known, -0.5 * error**2 / variance - 0.5 * np.log(variance), 0.0).sum(axis=1)
-        self._broken[index] += TRUST * broken
+        noise = self.noise * np.stack([self._kept, 1 / self._kept])[:, None, None, None]
+        variance = noise**2 * (1 + leverage) + (SLIP * both) ** 2
+        error = both - mean_t - slope * (at - mean_l)
+        likely = np.where(known, -0.5 * error**2 / variance - 0.5 * np.log(variance), 0.0)
+        self.inward[index], broken = _judged(expected, likely)
+        self._broken[index] += TRUST * broken.sum(axis=1)
+        robot = _mixed(self.inward[index], *both)
         terms = (np.ones_like(robot), at, robot, at * at, at * robot)
         decay = np.where(touching, SMOOTHNESS, 1.0)[:, None, None, None]
         for total, term in zip(self._lines, terms, strict=True):
             total[index] = decay * total[index] + np.where(touching[:, None, None, None], term, 0.0)
+
+
+def _judged(expected: np.ndarray, likely: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the probability of the first of two cases, and the logarithm of the likelihood of both together.
+
+    Args:
+        expected: Probability of the first case before anything is seen.
+        likely: Logarithms of the likelihoods of what is seen in the cases, ``(2, ...)``.
+    """
+    with np.errstate(divide="ignore"):
+        joint = likely + np.log(np.stack(np.broadcast_arrays(expected, 1 - expected)))
+    together = np.logaddexp(*joint)
+    return np.exp(joint[0] - together), together
+
+
+def _mixed(share: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return a mean of two arrays, by the share of the first."""
+    return np.asarray(share * one + (1 - share) * other)

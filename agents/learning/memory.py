@@ -22,6 +22,7 @@ MOVES = 6  # remembered moves of the motors
 FINE = 0.01  # force error that the logarithmic scale resolves [EI/L²]
 MOVE_SCALE = 28.0  # full increments in the range of a cable
 MOVED = ("cable", "length")
+KEPT_OUT = ("share",)  # entries that the known force has in it
 KNOWN = ("latency", "half_backlash", "loss", "rigidity", "rigidity_std", "force", "force_std")
 
 
@@ -34,11 +35,11 @@ class Memory:
         settings: Settings of the environments.
 
     Attributes:
-        size: Size of a row: an observation and its memory.
+        size: Size of a row: an observation but for what the known force has in it, and its memory.
     """
 
     def __init__(self, space: spaces.Dict, count: int, settings: Settings | SpatialSettings) -> None:
-        sizes = {key: box.shape[0] for key, box in space.items() if box.shape}
+        sizes = {key: box.shape[0] for key, box in space.items() if box.shape and key not in KEPT_OUT}
         self._moved = [key for key in MOVED if key in sizes]
         moved = sum(sizes[key] for key in self._moved)
         self._errors = np.zeros((count, len(DECAYS)))
@@ -65,7 +66,8 @@ class Memory:
         numbers = np.stack([getattr(known, name) for name in KNOWN], axis=1)
         behind = known.cables - self._range * observation["cable"].astype(float)
         errors, moves = self._update_errors(observation, known, index), self._update_moves(observation, index)
-        return np.concatenate([*observation.values(), numbers, behind, errors, moves], axis=1).astype(np.float32)
+        seen = [entry for key, entry in observation.items() if key not in KEPT_OUT]
+        return np.concatenate([*seen, numbers, behind, errors, moves], axis=1).astype(np.float32)
 
     def _update_errors(self, observation: Mapping[str, np.ndarray], known: Knowledge, index: EnvIndex) -> np.ndarray:
         """Return decaying averages of the force errors on a logarithmic scale, ``(k, decays)``."""

@@ -64,7 +64,8 @@ def test_exact_imperfections_are_ideal(env_id):
     if env_id in BY_ESTIMATE:  # their estimate knows the onset of contact to a step
         unlike = {"force_est", "force_measured", "force_error"}
     for (observed, info), (other, other_info) in zip(ideal, exact, strict=True):
-        assert other.keys() - observed.keys() == set(SENSED)
+        shared = {"share"} if "Braced" in env_id else set()  # among two obstacles
+        assert other.keys() - observed.keys() == set(SENSED) | shared
         for key in observed.keys() - unlike:
             assert other[key] == pytest.approx(observed[key], abs=2e-6), key
         for key in unlike - {"contact"}:
@@ -354,6 +355,25 @@ def test_invalid_ranges_are_refused(kwargs, message):
 def test_names_stand_for_the_default_ranges(sensing):
     assert make(sensing=sensing).settings.sensors == Sensing()
     assert make().settings.sensors is None
+
+
+@pytest.mark.parametrize("sensing", ["realistic", EXACT])
+def test_the_share_is_that_of_the_nominal_model_at_the_encoder(sensing):
+    env = make("CCR/BracedPush-v1", sensing=sensing)
+    shares = []
+    for seed in range(6):
+        scene = env.task.sample(env.settings.robot, np.random.default_rng(seed)).scene
+        observation, _ = env.reset(seed=seed, options={"scene": list(scene), "desired_force": 0.1})
+        model = Solver(env.settings.robot, scene)
+        state = model.rest()
+        for _ in range(40):
+            sizes = np.linalg.norm(state.forces, axis=1)
+            assert observation["share"] == pytest.approx(sizes[1] / max(sizes.sum(), 1e-300), abs=1e-5)
+            shares.append(float(observation["share"][0]))
+            observation, *_ = env.step(np.array([0.7], np.float32))
+            state = model.step(state, *env.privileged_state.motor_mm)
+    assert {0.0, 1.0} <= set(shares)
+    assert any(0.1 < share < 0.9 for share in shares)
 
 
 @pytest.mark.parametrize("env_id", [env_id for env_id in IDS if "Spatial" not in env_id])

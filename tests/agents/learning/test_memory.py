@@ -34,6 +34,17 @@ def test_it_holds_what_is_known_past_errors_and_moves(sensing):
         observation, *_ = env.step(np.full(1, 0.7, np.float32))
 
 
+def test_the_share_of_an_obstacle_is_in_the_force_and_not_beside_it():
+    env = make_env("CCR/BracedPush-v1", sensing="realistic")
+    memory = Memory(env.observation_space, 1, env.get_wrapper_attr("settings"))
+    observation, _ = env.reset(seed=0)
+    row = memory.update({key: value[None] for key, value in observation.items()})[0]
+    seen = np.concatenate([value for key, value in observation.items() if key != "share"])
+    assert "share" in observation
+    assert row.size == memory.size
+    assert np.array_equal(row[: seen.size], seen)
+
+
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
 def test_vectors_remember_as_single_environments_do(env_id):
     kwargs = {"sensing": "realistic", "split": "train"}
