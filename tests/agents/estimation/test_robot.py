@@ -70,7 +70,7 @@ def test_the_truth_is_within_two_standard_deviations(env_id, sensing):
 @pytest.mark.parametrize("sensing", ["realistic", "sensorless"])
 def test_the_force_on_one_of_two_obstacles_is_told_from_that_on_the_other(sensing):
     known, truth, touching, _ = probed("CCR/BracedPush-v1", sensing)
-    assert touching.mean() > 0.9  # where both forces count as one, the robot stops at the brace
+    assert touching.mean() > 0.85  # where both forces count as one, the robot stops at the brace
     for name in NUMBERS:
         assert covered(known, truth, touching, name) >= 0.93, name
     assert np.sqrt(np.mean((known.force - truth["force"])[touching] ** 2)) < 0.35
