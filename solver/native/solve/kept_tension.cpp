@@ -119,10 +119,22 @@ void ModelContinuation<Model>::hold_length(int cable) {
   }
 }
 
+// Lets all motors hold their cables again, which are at a command where they have followed to it within rounding.
 template <class Model>
-void ModelContinuation<Model>::hold_lengths() {
-  for (int k = 0; problem_.keeps_tensions(); ++k)
-    if (problem_.keeps_tension(k)) hold_length(k);
+void ModelContinuation<Model>::hold_lengths(const Command& target) {
+  for (int k = 0; problem_.keeps_tensions(); ++k) {
+    if (!problem_.keeps_tension(k)) continue;
+    double& length = present_.command.cables[k];
+    if (std::abs(length - target.cables[k]) <= follow_tolerance()) length = target.cables[k];
+    hold_length(k);
+  }
+}
+
+// How closely the length that a cable follows is known [mm]: another one through the same holes, which is held, closes
+// its gap within this.
+template <class Model>
+double ModelContinuation<Model>::follow_tolerance() const {
+  return kFeasibility * problem_.robot().max_length;
 }
 
 // Adds a cable whose motor keeps its tension to an active set: first, as those of a block are.
@@ -144,14 +156,12 @@ void ModelContinuation<Model>::follow_lengths(Command& command) const {
     if (problem_.keeps_tension(k)) command.cables[k] = problem_.taken(k);
 }
 
-// Leaves cables out of a goal whose motors keep their tension, unless it lets them out, by more than rounding: that of
-// the length to which a cable followed may stay, as where others run through the same holes.
+// Leaves cables out of a goal whose motors keep their tension, unless it lets them out by more than rounding.
 template <class Model>
 void ModelContinuation<Model>::leave_kept(Command& goal) const {
-  const double resolution = kCommandResolution * problem_.robot().offset;
   for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
     const double present = present_.command.cables[k];
-    if (problem_.keeps_tension(k) && goal.cables[k] >= present - resolution) goal.cables[k] = present;
+    if (problem_.keeps_tension(k) && goal.cables[k] >= present - follow_tolerance()) goal.cables[k] = present;
   }
 }
 
@@ -170,7 +180,7 @@ ModelContinuation<Model>::Command ModelContinuation<Model>::ceiling(const Comman
 template <class Model>
 int ModelContinuation<Model>::unwound_cable() const {
   for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
-    if (problem_.keeps_tension(k) && problem_.taken(k) < problem_.robot().rod.least_pull) return k;
+    if (problem_.keeps_tension(k) && problem_.taken(k) < problem_.robot().rod.least_pull - follow_tolerance()) return k;
   return -1;
 }
 
@@ -178,10 +188,9 @@ int ModelContinuation<Model>::unwound_cable() const {
 // none.
 template <class Model>
 int ModelContinuation<Model>::cable_beyond(const Command& ceiling) const {
-  const double resolution = kCommandResolution * problem_.robot().offset;
   int beyond = -1;
   for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
-    if (problem_.keeps_tension(k) && problem_.taken(k) > ceiling.cables[k] + resolution) beyond = k;
+    if (problem_.keeps_tension(k) && problem_.taken(k) > ceiling.cables[k] + follow_tolerance()) beyond = k;
   return beyond;
 }
 
@@ -247,7 +256,7 @@ bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
   template bool ModelContinuation<Model>::stop_holding(const Command&);                                                \
   template void ModelContinuation<Model>::hold_length(int);                                                            \
   template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
-  template void ModelContinuation<Model>::hold_lengths();                                                              \
+  template void ModelContinuation<Model>::hold_lengths(const Command&);                                                \
   template void ModelContinuation<Model>::add_kept_tension(int, ActiveSet&) const;                                     \
   template void ModelContinuation<Model>::follow_lengths(Command&) const;                                              \
   template void ModelContinuation<Model>::leave_kept(Command&) const;                                                  \

@@ -124,7 +124,7 @@ template <class Model>
 Status ModelContinuation<Model>::pursue(const Command& target) {
   Pursuit pursuit{.target = target};
   const Status status = pursue(pursuit);
-  hold_lengths();
+  hold_lengths(target);
   if (status == Status::kBlocked && pass_with_limit(target)) return Status::kSnapped;
   if (status != Status::kStalled || command_distance(present_.command, target) > kCommandResolution) return status;
   return pursuit.snapped ? Status::kSnapped : Status::kConverged;  // what stalled on the way was pulled in after all

@@ -152,7 +152,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool raise_tension(int cable, double aim, double ceiling);
   void keep_tension(int cable);
   void hold_length(int cable);
-  void hold_lengths();
+  void hold_lengths(const Command& target);
+  double follow_tolerance() const;
   bool pass_with_limit(const Command& target);
   void add_kept_tension(int cable, ActiveSet& active) const;
   void follow_lengths(Command& command) const;
