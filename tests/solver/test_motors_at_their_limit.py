@@ -115,3 +115,37 @@ def test_cables_that_lock_a_straight_robot_to_first_order_do_not_block_it():
         assert ends[-1].cables_mm == pytest.approx(command)
         assert max(solver.optimality(ends[-1])) < 1e-9
     assert ends[1].nodes == pytest.approx(ends[0].nodes, abs=1e-6)
+
+
+def test_a_motor_that_has_no_more_to_let_out_holds_and_stops_the_others():
+    cables = tuple(Cable(angle=angle) for angle in (5.47, 1.8, 3.79, 4.89))
+    robot = SpatialRobot.prototype(model="rod", cables=cables, max_tension=40.0, max_cable_mm=6.0)
+    solver = SpatialSolver(robot, Scene())
+    command = (5.72, -2.26, 2.15, 1.25)
+    once, often = (follow(solver, command, steps) for steps in (1, 10))
+    for state in (once, often):
+        assert state.status is Status.STALLED
+        assert state.cables_mm[1] == pytest.approx(-6.0, abs=1e-3)
+        assert state.tensions[1] == pytest.approx(40.0, rel=2e-6)
+        assert state.cables_mm.min() > -6 - 1e-9
+        assert max(solver.optimality(state)) < 1e-9
+    assert often.cables_mm == pytest.approx(once.cables_mm, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("angles", "command"),
+    [
+        ((0.0, 0.0, math.pi), (0.75, 0.75, 3.84)),
+        ((0.0, 2 * math.pi / 3, 4 * math.pi / 3, 0.0, 2 * math.pi / 3), (-0.79, 3.84, 0.63, -0.79, 3.84)),
+    ],
+)
+def test_cables_through_the_same_holes_stall_together(angles, command):
+    """Only the sum of their tensions is determined; the lengths that follow differ by rounding from those held."""
+    robot = SpatialRobot.prototype(model="rod", cables=tuple(Cable(angle=angle) for angle in angles))
+    solver = SpatialSolver(robot, Scene())
+    once, often = (follow(solver, command, steps) for steps in (1, 20))
+    for state in (once, often):
+        assert state.status is Status.STALLED
+        assert worst_motor(state, command) < 2e-6
+        assert max(solver.optimality(state)) < 1e-9
+    assert often.nodes == pytest.approx(once.nodes, abs=1e-5 * robot.length_mm)

@@ -49,7 +49,8 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
   present_evaluated_ = false;
   clear_trend();
   evaluate_present();
-  if (highest(tensions_) > problem_.robot().max_tension) {
+  const bool unwinds = problem_.keeps_tensions() && unwound_cable() >= 0;
+  if (highest(tensions_) > problem_.robot().max_tension || (unwinds && motor_holds)) {
     if (motor_holds) {
       over_limit_ = tensions_;
       return undo_descent(End::kOverTension);

@@ -42,7 +42,8 @@ bool ModelContinuation<Model>::keep_tensions_at_limit(const Tensions& over) {
   const double limit = problem_.robot().max_tension;
   bool kept = false;
   for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
-    if (problem_.keeps_tension(k) || over[k] <= limit || tensions_[k] < limit * (1 - kTensionBand)) continue;
+    if (problem_.keeps_tension(k) || let_out_[k]) continue;
+    if (over[k] <= limit || tensions_[k] < limit * (1 - kTensionBand)) continue;
     keep_tension(k);
     kept = true;
   }
@@ -118,10 +119,22 @@ void ModelContinuation<Model>::hold_length(int cable) {
   }
 }
 
+// Lets all motors hold their cables again, which are at a command where they have followed to it within rounding.
 template <class Model>
-void ModelContinuation<Model>::hold_lengths() {
-  for (int k = 0; problem_.keeps_tensions(); ++k)
-    if (problem_.keeps_tension(k)) hold_length(k);
+void ModelContinuation<Model>::hold_lengths(const Command& target) {
+  for (int k = 0; problem_.keeps_tensions(); ++k) {
+    if (!problem_.keeps_tension(k)) continue;
+    double& length = present_.command.cables[k];
+    if (std::abs(length - target.cables[k]) <= follow_tolerance()) length = target.cables[k];
+    hold_length(k);
+  }
+}
+
+// How closely the length that a cable follows is known [mm]: another one through the same holes, which is held, closes
+// its gap within this.
+template <class Model>
+double ModelContinuation<Model>::follow_tolerance() const {
+  return kFeasibility * problem_.robot().max_length;
 }
 
 // Adds a cable whose motor keeps its tension to an active set: first, as those of a block are.
@@ -143,11 +156,13 @@ void ModelContinuation<Model>::follow_lengths(Command& command) const {
     if (problem_.keeps_tension(k)) command.cables[k] = problem_.taken(k);
 }
 
-// Leaves cables out of a goal whose motors keep their tension, unless it lets them out.
+// Leaves cables out of a goal whose motors keep their tension, unless it lets them out by more than rounding.
 template <class Model>
 void ModelContinuation<Model>::leave_kept(Command& goal) const {
-  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
-    if (problem_.keeps_tension(k)) goal.cables[k] = std::min(goal.cables[k], present_.command.cables[k]);
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
+    const double present = present_.command.cables[k];
+    if (problem_.keeps_tension(k) && goal.cables[k] >= present - follow_tolerance()) goal.cables[k] = present;
+  }
 }
 
 // How far cables may be pulled in part of the way to a goal.
@@ -160,25 +175,47 @@ ModelContinuation<Model>::Command ModelContinuation<Model>::ceiling(const Comman
   return highest;
 }
 
+// A cable that has followed the shape at which the problem is evaluated farther than its motor lets it out; -1 where
+// there is none.
+template <class Model>
+int ModelContinuation<Model>::unwound_cable() const {
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (problem_.keeps_tension(k) && problem_.taken(k) < problem_.robot().rod.least_pull - follow_tolerance()) return k;
+  return -1;
+}
+
+// A cable that has followed the shape at which the problem is evaluated farther in than to a ceiling; -1 where there is
+// none.
+template <class Model>
+int ModelContinuation<Model>::cable_beyond(const Command& ceiling) const {
+  int beyond = -1;
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (problem_.keeps_tension(k) && problem_.taken(k) > ceiling.cables[k] + follow_tolerance()) beyond = k;
+  return beyond;
+}
+
 // Tries a command among motors that keep their tension, none of which pulls its cable farther in than to a ceiling:
-// what would go beyond is held there.
+// what would go beyond is held there. A motor that has no more to let out holds its cable, whatever the tension then.
 template <class Model>
 ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command& ceiling, Command command) {
-  const double resolution = kCommandResolution * problem_.robot().offset;
   for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
     if (problem_.keeps_tension(k)) command.cables[k] = present_.command.cables[k];
   std::array<int, kMaxCables> stopped;
   int count = 0;
   for (Move move = try_command(command);; move = try_command(command)) {
-    int beyond = -1;
-    for (int k = 0; k < static_cast<int>(layout_.cables.size) && move == Move::kAccepted; ++k) {
-      if (!problem_.keeps_tension(k)) continue;
-      if (problem_.taken(k) < problem_.robot().rod.least_pull) move = Move::kRejected;  // it has no more to let out
-      if (problem_.taken(k) > ceiling.cables[k] + resolution) beyond = k;
+    const bool shortest = command_distance(present_.command, command) <= kSmallestStep;
+    if (const int unwound = move == Move::kAccepted ? unwound_cable() : -1; unwound >= 0) {
+      if (shortest) {
+        hold_length(unwound);
+        let_out_[unwound] = true;
+        continue;
+      }
+      move = Move::kRejected;
     }
+    const int beyond = move == Move::kAccepted ? cable_beyond(ceiling) : -1;
     if (move == Move::kAccepted && beyond < 0) return move;
     if (move != Move::kAccepted) {  // those that were stopped keep their tension in a shorter sub-step
-      const bool jumps = move == Move::kOverTension && command_distance(present_.command, command) <= kSmallestStep;
+      const bool jumps = move == Move::kOverTension && shortest;
       for (int j = 0; j < count && !jumps; ++j) keep_tension(stopped[j]);
       return count > 0 && !jumps ? Move::kRejected : move;
     }
@@ -219,10 +256,11 @@ bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
   template bool ModelContinuation<Model>::stop_holding(const Command&);                                                \
   template void ModelContinuation<Model>::hold_length(int);                                                            \
   template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
-  template void ModelContinuation<Model>::hold_lengths();                                                              \
+  template void ModelContinuation<Model>::hold_lengths(const Command&);                                                \
   template void ModelContinuation<Model>::add_kept_tension(int, ActiveSet&) const;                                     \
   template void ModelContinuation<Model>::follow_lengths(Command&) const;                                              \
   template void ModelContinuation<Model>::leave_kept(Command&) const;                                                  \
+  template int ModelContinuation<Model>::unwound_cable() const;                                                        \
   template ModelContinuation<Model>::Command ModelContinuation<Model>::ceiling(const Command&, const Command&, double) \
       const;                                                                                                           \
   template ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command&, Command);

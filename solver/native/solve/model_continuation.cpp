@@ -124,7 +124,7 @@ template <class Model>
 Status ModelContinuation<Model>::pursue(const Command& target) {
   Pursuit pursuit{.target = target};
   const Status status = pursue(pursuit);
-  hold_lengths();
+  hold_lengths(target);
   if (status == Status::kBlocked && pass_with_limit(target)) return Status::kSnapped;
   if (status != Status::kStalled || command_distance(present_.command, target) > kCommandResolution) return status;
   return pursuit.snapped ? Status::kSnapped : Status::kConverged;  // what stalled on the way was pulled in after all
@@ -134,6 +134,7 @@ template <class Model>
 Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
   newton_.begin_step();
   over_limit_ = {};
+  let_out_ = {};
   const double limit = problem_.robot().max_tension;
   for (int sub = 0; sub < kSubSteps && !work_is_spent(); ++sub) {
     // A release may lead to more tension than a motor holds: it yields until it holds again.
@@ -162,13 +163,14 @@ Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
 
 // Pulls stalled cables again, as others that moved on may have let them; false where that has just been tried.
 template <class Model>
-bool ModelContinuation<Model>::resume(Pursuit& pursuit) const {
+bool ModelContinuation<Model>::resume(Pursuit& pursuit) {
   const Command& here = present_.command;
   if (pursuit.wanted == pursuit.target || pursuit.reached != Status::kStalled) return false;
   if (pursuit.was_resumed && command_distance(here, pursuit.resumed) <= kSmallestStep) return false;
   pursuit.wanted = pursuit.target;
   pursuit.resumed = here;
   pursuit.was_resumed = true;
+  let_out_ = {};
   return true;
 }
 

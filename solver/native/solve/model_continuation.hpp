@@ -75,7 +75,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // Following a branch.
   Status pursue(const Command& target);
   Status pursue(Pursuit& pursuit);
-  bool resume(Pursuit& pursuit) const;
+  bool resume(Pursuit& pursuit);
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
   bool give_way(Pursuit& pursuit, const Command& next, double size);
   bool refine(Pursuit& pursuit, double size, bool blocked);
@@ -152,12 +152,15 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool raise_tension(int cable, double aim, double ceiling);
   void keep_tension(int cable);
   void hold_length(int cable);
-  void hold_lengths();
+  void hold_lengths(const Command& target);
+  double follow_tolerance() const;
   bool pass_with_limit(const Command& target);
   void add_kept_tension(int cable, ActiveSet& active) const;
   void follow_lengths(Command& command) const;
   void leave_kept(Command& goal) const;
   Command ceiling(const Command& wanted, const Command& goal, double part) const;
+  int unwound_cable() const;
+  int cable_beyond(const Command& ceiling) const;
   Move try_below(const Command& ceiling, Command command);
 
   // Gaps that no motion satisfies together.
@@ -190,8 +193,9 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Trend<Model> trend_;  // at `present_`
   double energy_ = 0;   // of `present_`
   Tensions tensions_{}, trial_tensions_{};
-  Tensions over_limit_{};           // of the last shape of this step that the motors could not hold
-  bool present_evaluated_ = false;  // whether the contact problem is evaluated at `present_`
+  std::array<bool, kCables> let_out_{};  // whether a motor at its limit was found to have no more to let out
+  Tensions over_limit_{};                // of the last shape of this step that the motors could not hold
+  bool present_evaluated_ = false;       // whether the contact problem is evaluated at `present_`
 
   StepResult result_;  // of the step under way
   Interruption interruption_;
