@@ -21,7 +21,8 @@ double ModelContinuation<Model>::highest_held(const Tensions& tensions) const {
 }
 
 // Where pulling on leads beyond the limit: lets the motors keep their tension that are at the limit then, or else
-// raises it to there, or else all that are at the limit. False where there are none but those that do, or one cable.
+// raises it to there, or else all that are at the limit, or else those that jump over it keep a tension below, which is
+// raised in the end. False where there are none but those that do, or one cable.
 template <class Model>
 bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
   if constexpr (Model::kRod) {
@@ -31,9 +32,42 @@ bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
     if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted)) return true;
     Tensions all;
     all.v.fill(HUGE_VAL);
-    return keep_tensions_at_limit(all);
+    return keep_tensions_at_limit(all) || keep_tensions_that_jump();
   }
   return false;
+}
+
+// Lets motors keep their present tension that jumps over the limit within the smallest sub-step, as where another cable
+// becomes taut. False where there are none, or none that have not done so too often.
+template <class Model>
+bool ModelContinuation<Model>::keep_tensions_that_jump() {
+  bool kept = false;
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
+    if (problem_.keeps_tension(k) || over_limit_[k] <= problem_.robot().max_tension) continue;
+    if (jumps_[k]++ >= kJumps) continue;
+    keep_tension(k);
+    kept = true;
+  }
+  if (kept) clear_trend();
+  return kept;
+}
+
+// Raises tensions to the limit that motors keep below it. False where there are none, or none that have not been raised
+// too often.
+template <class Model>
+bool ModelContinuation<Model>::raise_kept_tensions(const Command& target) {
+  bool raised = false;
+  if constexpr (Model::kRod) {
+    const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
+    evaluate_present();
+    if (highest_held(tensions_) > limit) return false;
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
+      if (!problem_.keeps_tension(k) || tensions_[k] >= limit * (1 - kTensionBand) || jumps_[k] > kJumps) continue;
+      raise_tension(k, aim, target.cables[k]);
+      raised = true;
+    }
+  }
+  return raised;
 }
 
 // Lets the motors at the limit keep their tension, among those that some tensions exceed it of.
@@ -217,6 +251,7 @@ bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
 #define CCR_INSTANTIATE(Model)                                                                                         \
   template double ModelContinuation<Model>::highest_held(const Tensions&) const;                                       \
   template bool ModelContinuation<Model>::stop_holding(const Command&);                                                \
+  template bool ModelContinuation<Model>::raise_kept_tensions(const Command&);                                         \
   template void ModelContinuation<Model>::hold_length(int);                                                            \
   template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
   template void ModelContinuation<Model>::hold_lengths();                                                              \
