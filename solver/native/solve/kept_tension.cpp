@@ -222,6 +222,22 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command
   }
 }
 
+// Whether a command is met after all, at which the pursuit of it ended with a status, or so close to it that one more
+// sub-step meets it.
+template <class Model>
+bool ModelContinuation<Model>::is_met(const Command& target, Status status) {
+  if (status < Status::kStalled || result_.interrupted) return false;
+  if (Model::kRod && layout_.cables.size > 1 && status == Status::kStalled &&
+      command_distance(present_.command, target) <= kSmallestStep && !(present_.command == target) &&
+      try_command(target) == Move::kAccepted) {
+    accept();
+    clear_trend();
+  }
+  evaluate_present();
+  return command_distance(present_.command, target) <= kCommandResolution &&
+         highest(tensions_) <= problem_.robot().max_tension;
+}
+
 // Where cables that no limit stops lock a robot that touches nothing, to first order: takes it to the command past
 // their balance, with motors of growing strength that let their cables follow meanwhile. False where it is not reached
 // before geometry blocks the robot.
@@ -253,6 +269,7 @@ bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
   template bool ModelContinuation<Model>::stop_holding(const Command&);                                                \
   template bool ModelContinuation<Model>::raise_kept_tensions(const Command&);                                         \
   template void ModelContinuation<Model>::hold_length(int);                                                            \
+  template bool ModelContinuation<Model>::is_met(const Command&, Status);                                              \
   template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
   template void ModelContinuation<Model>::hold_lengths();                                                              \
   template void ModelContinuation<Model>::add_kept_tension(int, ActiveSet&) const;                                     \

@@ -131,22 +131,6 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
   return pursuit.snapped ? Status::kSnapped : Status::kConverged;  // what stalled on the way was pulled in after all
 }
 
-// Whether a command is met after all, at which the pursuit of it ended with a status, or so close to it that one more
-// sub-step meets it.
-template <class Model>
-bool ModelContinuation<Model>::is_met(const Command& target, Status status) {
-  if (status < Status::kStalled || result_.interrupted) return false;
-  if (Model::kRod && layout_.cables.size > 1 && status == Status::kStalled &&
-      command_distance(present_.command, target) <= kSmallestStep && !(present_.command == target) &&
-      try_command(target) == Move::kAccepted) {
-    accept();
-    clear_trend();
-  }
-  evaluate_present();
-  return command_distance(present_.command, target) <= kCommandResolution &&
-         highest(tensions_) <= problem_.robot().max_tension;
-}
-
 template <class Model>
 Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
   newton_.begin_step();
