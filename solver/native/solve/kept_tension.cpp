@@ -21,24 +21,24 @@ double ModelContinuation<Model>::highest_held(const Tensions& tensions) const {
 }
 
 // Where pulling on leads beyond the limit: lets the motors keep their tension that are at the limit then, or else
-// raises it to there, or else all that are at the limit, or else those that jump over it keep a tension below, which is
-// raised in the end. False where there are none but those that do, or one cable.
+// raises it to there, or else lets those that jump over it keep a tension below, which is raised in the end, or else all
+// that are at the limit. False where there are none but those that do, or one cable.
 template <class Model>
 bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
   if constexpr (Model::kRod) {
     if (layout_.cables.size == 1) return false;
     evaluate_present();
     if (highest_held(tensions_) > problem_.robot().max_tension) return false;
-    if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted)) return true;
+    if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted) || keep_tensions_that_jump()) return true;
     Tensions all;
     all.v.fill(HUGE_VAL);
-    return keep_tensions_at_limit(all) || keep_tensions_that_jump();
+    return keep_tensions_at_limit(all);
   }
   return false;
 }
 
 // Lets motors keep their present tension that jumps over the limit within the smallest sub-step, as where another cable
-// becomes taut. False where there are none, or none that have not done so too often.
+// becomes taut, or slack that shared the load. False where there are none, or none that have not done so too often.
 template <class Model>
 bool ModelContinuation<Model>::keep_tensions_that_jump() {
   bool kept = false;
