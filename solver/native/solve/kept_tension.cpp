@@ -21,8 +21,8 @@ double ModelContinuation<Model>::highest_held(const Tensions& tensions) const {
 }
 
 // Where pulling on leads beyond the limit: lets the motors keep their tension that are at the limit then, or else
-// raises it to there, or else lets those that jump over it keep a tension below, which is raised in the end, or else all
-// that are at the limit. False where there are none but those that do, or one cable.
+// raises it to there, or else lets those that jump over it keep what they have, which is raised in the end, or else
+// lets all that are at the limit. False where there are none but those that do, or one cable.
 template <class Model>
 bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
   if constexpr (Model::kRod) {
@@ -223,19 +223,21 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command
 }
 
 // Whether a command is met after all, at which the pursuit of it ended with a status, or so close to it that one more
-// sub-step meets it.
+// sub-step meets it: several cables meet it to within the feasibility of their slack.
 template <class Model>
 bool ModelContinuation<Model>::is_met(const Command& target, Status status) {
   if (status < Status::kStalled || result_.interrupted) return false;
-  if (Model::kRod && layout_.cables.size > 1 && status == Status::kStalled &&
-      command_distance(present_.command, target) <= kSmallestStep && !(present_.command == target) &&
-      try_command(target) == Move::kAccepted) {
+  const Robot& robot = problem_.robot();
+  const bool several = Model::kRod && layout_.cables.size > 1;
+  if (several && status == Status::kStalled && !(present_.command == target) &&
+      command_distance(present_.command, target) <= kSmallestStep && try_command(target) == Move::kAccepted) {
     accept();
     clear_trend();
   }
   evaluate_present();
-  return command_distance(present_.command, target) <= kCommandResolution &&
-         highest(tensions_) <= problem_.robot().max_tension;
+  const double hidden = several ? kFeasibility * robot.max_length / robot.offset : 0.0;
+  return command_distance(present_.command, target) <= std::max(hidden, kCommandResolution) &&
+         highest(tensions_) <= robot.max_tension;
 }
 
 // Where cables that no limit stops lock a robot that touches nothing, to first order: takes it to the command past
