@@ -101,6 +101,7 @@ inline constexpr double kPeakStep = 1.25e-3;  // sub-step within which a peak of
 inline constexpr int kSettling = 3;           // iterations for an equilibrium of cables that pull against each other
 inline constexpr double kYield = 0.0025;      // first displacement by which an overloaded motor yields [a]
 inline constexpr double kFirstLimit = 8.0;    // first limit over EI/aL past the balance of cables that lock a robot
+inline constexpr int kJumps = 8;              // of a tension over the limit in a step, after which its cable is held
 inline constexpr int kStallIterations = 40;
 inline constexpr double kCommandResolution = 1.25e-12;  // smallest difference of commands [a]
 

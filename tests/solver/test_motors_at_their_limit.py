@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solver import Cable, Circle, Robot, Scene, Solver, Status
+from solver import Cable, Circle, Load, Robot, Scene, Solver, Status
 from solver.spatial import SpatialRobot, SpatialSolver
 
 CIRCLE = Scene([Circle(center=(44, 104), radius=15)])
@@ -93,6 +93,90 @@ def test_no_motor_of_a_random_robot_stops_below_its_limit(seed):
         assert worst_motor(state, command) < 2e-6
         assert (state.status is Status.STALLED) == (np.max(command - state.cables_mm) > 1e-9)
     assert often.nodes == pytest.approx(once.nodes, abs=1e-4 * robot.length_mm)
+
+
+HEAVY = Robot.prototype(
+    segments=12,
+    length_range_mm=(60, 180),
+    cables=(
+        Cable(offset_mm=5.532, end=4),
+        Cable(offset_mm=3.2799),
+        Cable(angle=math.pi, offset_mm=4.3883, end=6),
+        Cable(angle=math.pi, offset_mm=7.8788, end=4),
+    ),
+    weight_per_length=(-0.000429, 0.0004265),
+    loads=(Load(node=10, force=(0.0893, 0.0269), moment=-0.7193),),
+)
+WEAK = Robot.prototype(
+    cables=(
+        Cable(offset_mm=7.812776, end=9),
+        Cable(angle=math.pi, offset_mm=4.943345, end=9),
+        Cable(angle=math.pi, offset_mm=5.381867, end=9),
+    ),
+    max_tension=8.0,
+    precurvature=-0.008863154,
+    weight_per_length=(-8.9934e-05, -3.691471e-05),
+)
+JUMPS = [
+    (HEAVY, (-3.16046, 1.72238, -10.69353, 0.9737, 173.95867), (3.04125, 2.4714, 5.90427, 0.31431, 73.91011)),
+    (WEAK, (8.26312, -5.76662, -9.09543), (6.69359, 3.15854, -9.70981)),
+]
+
+
+def put(solver, state, target):
+    """Return the state under a command of cables [mm], and a length [mm] after them where the robot has one."""
+    cables = len(solver.robot.cables)
+    return solver.step(state, tuple(target[:cables]), *target[cables:])
+
+
+@pytest.mark.parametrize(("robot", "first", "second"), JUMPS)
+def test_a_tension_that_jumps_over_its_limit_holds_up_no_other_motor(robot, first, second):
+    """Just below its limit, outside its band, one motor made all others wait, even one of a slack cable."""
+    solver = Solver(robot, Scene())
+    start = put(solver, solver.rest(), first)
+    once = put(solver, start, second)
+    often, way = start, np.array([*start.cables_mm, *first[len(robot.cables) :]])
+    for part in np.linspace(0, 1, 21)[1:]:
+        often = put(solver, often, way + part * (np.array(second) - way))
+    command = np.array(second[: len(robot.cables)])
+    for state in (once, often):
+        assert state.status is Status.STALLED
+        assert worst_motor(state, command) < 2e-6
+    assert often.nodes == pytest.approx(once.nodes, abs=1e-5 * robot.length_mm)
+
+
+@pytest.mark.parametrize("name", ["rao_2021", "snake_arm", "neuroendoscope", "guidewire"])
+@pytest.mark.parametrize(("robots", "solvers"), [(Robot, Solver), (SpatialRobot, SpatialSolver)])
+def test_stalled_cables_that_are_let_out_to_zero_have_met_their_command(robots, solvers, name):
+    robot = robots.preset(name)
+    solver, generator = solvers(robot, Scene()), np.random.default_rng(1)
+    for _ in range(30):
+        stalled = solver.step(solver.rest(), tuple(generator.normal(0, robot.offset_mm / 2, len(robot.cables))))
+        released = solver.step(stalled, (0.0,) * len(robot.cables))
+        assert released.status <= Status.SNAPPED
+        assert released.cables_mm == pytest.approx(0, abs=1e-11)
+        assert max(solver.optimality(released)) < 1e-9
+
+
+def test_a_robot_whose_cables_are_let_out_retracts_all_the_way():
+    cables = tuple(
+        Cable(offset_mm=offset, end=end) for offset, end in ((5.250245, 3), (4.635192, 2), (6.219038, 3), (5.464825, 6))
+    )
+    load = Load(node=6, force=(-0.184509, -0.0476642), moment=0.650204)
+    robot = Robot.prototype(
+        segments=6,
+        length_range_mm=(60, 180),
+        max_tension=2.0,
+        between=2,
+        cables=cables,
+        weight_per_length=(-0.0001873, -0.000479189),
+        loads=(load,),
+    )
+    solver = Solver(robot, Scene())
+    out = solver.step(solver.rest(), (-0.4309975, -0.2605176, -0.2702091, -0.0692769), 179.00083)
+    back = solver.step(out, (-3.784854, -7.473656, -11.235263, -4.298593), 76.031027)
+    assert back.status is Status.CONVERGED
+    assert back.length_mm == pytest.approx(76.031027)
 
 
 def test_cables_that_lock_a_straight_robot_to_first_order_do_not_block_it():

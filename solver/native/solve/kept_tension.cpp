@@ -21,19 +21,53 @@ double ModelContinuation<Model>::highest_held(const Tensions& tensions) const {
 }
 
 // Where pulling on leads beyond the limit: lets the motors keep their tension that are at the limit then, or else
-// raises it to there, or else all that are at the limit. False where there are none but those that do, or one cable.
+// raises it to there, or else lets those that jump over it keep what they have, which is raised in the end, or else
+// lets all that are at the limit. False where there are none but those that do, or one cable.
 template <class Model>
 bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
   if constexpr (Model::kRod) {
     if (layout_.cables.size == 1) return false;
     evaluate_present();
     if (highest_held(tensions_) > problem_.robot().max_tension) return false;
-    if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted)) return true;
+    if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted) || keep_tensions_that_jump()) return true;
     Tensions all;
     all.v.fill(HUGE_VAL);
     return keep_tensions_at_limit(all);
   }
   return false;
+}
+
+// Lets motors keep their present tension that jumps over the limit within the smallest sub-step, as where another cable
+// becomes taut, or slack that shared the load. False where there are none, or none that have not done so too often.
+template <class Model>
+bool ModelContinuation<Model>::keep_tensions_that_jump() {
+  bool kept = false;
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
+    if (problem_.keeps_tension(k) || over_limit_[k] <= problem_.robot().max_tension) continue;
+    if (jumps_[k]++ >= kJumps) continue;
+    keep_tension(k);
+    kept = true;
+  }
+  if (kept) clear_trend();
+  return kept;
+}
+
+// Raises tensions to the limit that motors keep below it. False where there are none, or none that have not been raised
+// too often.
+template <class Model>
+bool ModelContinuation<Model>::raise_kept_tensions(const Command& target) {
+  bool raised = false;
+  if constexpr (Model::kRod) {
+    const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
+    evaluate_present();
+    if (highest_held(tensions_) > limit) return false;
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
+      if (!problem_.keeps_tension(k) || tensions_[k] >= limit * (1 - kTensionBand) || jumps_[k] > kJumps) continue;
+      raise_tension(k, aim, target.cables[k]);
+      raised = true;
+    }
+  }
+  return raised;
 }
 
 // Lets the motors at the limit keep their tension, among those that some tensions exceed it of.
@@ -225,6 +259,24 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command
   }
 }
 
+// Whether a command is met after all, at which the pursuit of it ended with a status, or so close to it that one more
+// sub-step meets it: several cables meet it to within the feasibility of their slack.
+template <class Model>
+bool ModelContinuation<Model>::is_met(const Command& target, Status status) {
+  if (status < Status::kStalled || result_.interrupted) return false;
+  const Robot& robot = problem_.robot();
+  const bool several = Model::kRod && layout_.cables.size > 1;
+  if (several && status == Status::kStalled && !(present_.command == target) &&
+      command_distance(present_.command, target) <= kSmallestStep && try_command(target) == Move::kAccepted) {
+    accept();
+    clear_trend();
+  }
+  evaluate_present();
+  const double hidden = several ? kFeasibility * robot.max_length / robot.offset : 0.0;
+  return command_distance(present_.command, target) <= std::max(hidden, kCommandResolution) &&
+         highest(tensions_) <= robot.max_tension;
+}
+
 // Where cables that no limit stops lock a robot that touches nothing, to first order: takes it to the command past
 // their balance, with motors of growing strength that let their cables follow meanwhile. False where it is not reached
 // before geometry blocks the robot.
@@ -254,7 +306,9 @@ bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
 #define CCR_INSTANTIATE(Model)                                                                                         \
   template double ModelContinuation<Model>::highest_held(const Tensions&) const;                                       \
   template bool ModelContinuation<Model>::stop_holding(const Command&);                                                \
+  template bool ModelContinuation<Model>::raise_kept_tensions(const Command&);                                         \
   template void ModelContinuation<Model>::hold_length(int);                                                            \
+  template bool ModelContinuation<Model>::is_met(const Command&, Status);                                              \
   template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
   template void ModelContinuation<Model>::hold_lengths(const Command&);                                                \
   template void ModelContinuation<Model>::add_kept_tension(int, ActiveSet&) const;                                     \

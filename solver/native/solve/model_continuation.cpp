@@ -126,15 +126,15 @@ Status ModelContinuation<Model>::pursue(const Command& target) {
   const Status status = pursue(pursuit);
   hold_lengths(target);
   if (status == Status::kBlocked && pass_with_limit(target)) return Status::kSnapped;
-  if (status != Status::kStalled || command_distance(present_.command, target) > kCommandResolution) return status;
+  if (!is_met(target, status)) return status;
+  result_.reason = Reason::kNone;
   return pursuit.snapped ? Status::kSnapped : Status::kConverged;  // what stalled on the way was pulled in after all
 }
 
 template <class Model>
 Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
   newton_.begin_step();
-  over_limit_ = {};
-  let_out_ = {};
+  over_limit_ = {}, let_out_ = {}, jumps_ = {};
   const double limit = problem_.robot().max_tension;
   for (int sub = 0; sub < kSubSteps && !work_is_spent(); ++sub) {
     // A release may lead to more tension than a motor holds: it yields until it holds again.
@@ -154,7 +154,7 @@ Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
     if (highest(tensions_) > limit) wait_for_motors(goal);
     if (problem_.keeps_tensions()) leave_kept(goal);
     const double remaining = command_distance(present_.command, goal);
-    if (remaining == 0 && resume(pursuit)) continue;
+    if (remaining == 0 && (raise_kept_tensions(pursuit.target) || resume(pursuit))) continue;
     if (remaining == 0 || !advance(pursuit, goal, remaining)) return pursuit.reached;
   }
   result_.reason = Reason::kWork;
@@ -226,7 +226,7 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   if (!stalled) return true;
   pursuit.reached = std::max(pursuit.reached, Status::kStalled);
   if (stop_holding(pursuit.wanted)) return true;
-  if (!hold_stalled_cables(pursuit.wanted) && !resume(pursuit)) return false;
+  if (!hold_stalled_cables(pursuit.wanted) && !raise_kept_tensions(pursuit.target) && !resume(pursuit)) return false;
   clear_trend();
   return true;
 }

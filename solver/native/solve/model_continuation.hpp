@@ -75,6 +75,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // Following a branch.
   Status pursue(const Command& target);
   Status pursue(Pursuit& pursuit);
+  bool is_met(const Command& target, Status status);
   bool resume(Pursuit& pursuit);
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
   bool give_way(Pursuit& pursuit, const Command& next, double size);
@@ -148,7 +149,9 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   double highest_held(const Tensions& tensions) const;
   bool stop_holding(const Command& wanted);
   bool keep_tensions_at_limit(const Tensions& over);
+  bool keep_tensions_that_jump();
   bool raise_to_limit(const Command& wanted);
+  bool raise_kept_tensions(const Command& target);
   bool raise_tension(int cable, double aim, double ceiling);
   void keep_tension(int cable);
   void hold_length(int cable);
@@ -195,6 +198,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Tensions tensions_{}, trial_tensions_{};
   std::array<bool, kCables> let_out_{};  // whether a motor at its limit was found to have no more to let out
   Tensions over_limit_{};                // of the last shape of this step that the motors could not hold
+  std::array<int, kMaxCables> jumps_{};  // of each tension over the limit, in this step
   bool present_evaluated_ = false;       // whether the contact problem is evaluated at `present_`
 
   StepResult result_;  // of the step under way

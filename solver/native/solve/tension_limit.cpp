@@ -62,6 +62,8 @@ bool ModelContinuation<Model>::approach_tension_limit() {
   };
   const Command start = present_.command, end = trial_.command;
   const double span = command_distance(start, end);
+  // Within which any of the cables that share a load may be taut, as their slack is not resolved.
+  const double hidden = 100 * kFeasibility * problem_.robot().max_length / problem_.robot().offset;
   double low = 0, high = 1;  // fractions of the way
   double excess = highest(trial_tensions_) - aim, shortage = approaching() - aim;
   Move last = Move::kRejected;
@@ -81,7 +83,7 @@ bool ModelContinuation<Model>::approach_tension_limit() {
       if (move == last) excess /= 2;
     } else {
       high = middle;
-      over_limit_ = trial_tensions_;
+      if (width * span > hidden) over_limit_ = trial_tensions_;
       excess = highest(trial_tensions_) - aim;
       if (move == last) shortage /= 2;
     }
