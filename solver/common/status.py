@@ -19,8 +19,8 @@ class Status(IntEnum):
 
     The cable moved as far as the limit. Where a rod has several, the others go on as far as commanded: a
     motor at its limit cannot hold, so it keeps its tension and its cable's length follows, in or out. Each motor then
-    either has met its command, or is at its limit. A command that every cable has met at the end is not reported as
-    stalled, whatever happened on the way.
+    either has met its command, or is at its limit; only where one has let out all of its cable it holds, and others stop
+    short. A command that every cable has met at the end is not reported as stalled, whatever happened on the way.
 
     In the paper's model of space, cables at the limit hold still, and a step may end below the limit with this status.
 
@@ -30,7 +30,8 @@ class Status(IntEnum):
     """The obstacles block the robot below its tension limit: to first order, no motion that respects all of them
     follows the command.
 
-    The tension grows without bound on the way there, so a finite limit stalls the robot first.
+    A force grows without bound on the way there. Of cables, a finite tension limit stalls the robot first; an insertion
+    has no limit.
     """
     GAVE_UP = 4
     """No further equilibrium was found; the last valid one on the way is kept.
