@@ -73,13 +73,12 @@ def test_twisted_in_space(robot, turns, twists, ways):
     assert_bounded(spatial.SpatialSolver(curved, Scene()).rest().points, curved)
 
 
-@pytest.mark.parametrize("force", [0.5, 2.0])
-def test_twisted_by_loads(force):
-    """A couple twists a curved segment, that resists it but little, as far as the bound allows."""
+def twisted_by(force):
+    """A curved segment, that resists twist but little, under a couple."""
     couple = tuple(
         Load(node=1, force=(0.0, sign * force, 0.0), at=(8.0, way)) for sign, way in ((1, 0.0), (-1, math.pi))
     )
-    robot = spatial.SpatialRobot(
+    return spatial.SpatialRobot(
         length_mm=20.0,
         segments=2,
         offset_mm=8.0,
@@ -90,6 +89,15 @@ def test_twisted_by_loads(force):
         precurvature=((0.0, 1.2, 0.0), (0.0, 0.0, 0.0)),
         touch=("backbone", "rim"),
     )
+
+
+def test_twisted_by_loads():
+    robot = twisted_by(0.5)
     rest = spatial.SpatialSolver(robot, Scene()).rest()
     assert abs(rest.controls[0, 2]) > robot.segment_mm / (2 * robot.offset_mm)
     assert_bounded(rest.points, robot)
+
+
+def test_twisted_farther_than_the_bound_allows():
+    with pytest.raises(ValueError, match="bend or twist it too far: raise max_tension or rigidity"):
+        spatial.SpatialSolver(twisted_by(2.0), Scene()).rest()
