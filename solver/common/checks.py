@@ -66,7 +66,7 @@ def check_carried(robot: AnyRobot, status: int) -> None:
     """
     if status == Status.GAVE_UP:
         raise ValueError(
-            f"max_tension is {robot.max_tension:.6g} N; at rest the loads of the robot cannot all be carried within it, "
+            f"max_tension is {robot.max_tension:.6g} N; at rest its loads cannot all be carried within it, "
             f"its cables paid out to {robot.least_cable_mm:.6g} mm at most, or bend or twist it too far: raise "
             "max_tension or rigidity, lower loads or weight, or add an opposed cable"
         )

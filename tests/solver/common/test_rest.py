@@ -78,12 +78,14 @@ def test_a_cable_that_cannot_be_paid_out_holds_the_robot_or_there_is_no_rest():
     robot = Robot.prototype(loads=(Load(node=18, force=(-0.2, 0.0)),))
     needed = rest(robot, np.inf, "plane").tensions[0]
     for share in np.linspace(0.97, 0.9999, 21).tolist():
-        with pytest.raises(ValueError, match=r"max_tension is .*, its cables paid out to 0 mm at most: raise max_t"):
+        with pytest.raises(
+            ValueError, match=r"max_tension is .*, its cables paid out to 0 mm at most, or .*: raise max_t"
+        ):
             rest(robot, share * needed, "plane")
     batch, weak = BatchSolver(robot, 2, 0), replace(robot, max_tension=0.99 * needed)
     batch.assign(0, Scene(), weak)
     batch.assign(1, Scene())
-    with pytest.raises(ValueError, match="at rest the loads of the robot cannot all be carried"):
+    with pytest.raises(ValueError, match="at rest its loads cannot all be carried"):
         batch.rest([0, 1])
     with pytest.raises(ValueError, match="before it moves"):
         batch.step(np.zeros(2))

@@ -79,7 +79,7 @@ def test_loads_that_a_single_cable_cannot_hold_are_refused(cables):
     if len(cables) == 2:
         assert Solver(loaded, Scene()).rest().tensions.max() <= 1  # the motors pay them out
         return
-    with pytest.raises(ValueError, match=r"max_tension is 1 N; at rest the loads .* raise max_tension"):
+    with pytest.raises(ValueError, match=r"max_tension is 1 N; at rest its loads .* raise max_tension"):
         Solver(loaded, Scene())
     held = Solver(replace(loaded, max_tension=15.0), Scene()).rest()
     assert 1 < held.tensions[0] < 15
