@@ -74,7 +74,11 @@ class Pressing(NamedTuple):
 
 
 class FreeRobots:
-    """N robots that nothing touches, each with companions that are pulled a little less by one command each.
+    """N robots that nothing touches, each with companions that are pulled a little less.
+
+    A robot of one section has a companion for each command. One of several sections has a single one, pulled less by
+    all commands in proportion: bent alike, its sections are where cables of some just become slack, and only along the
+    way that they were pulled do all slopes belong to one branch. Its slopes are projections onto that way.
 
     Args:
         adapter: Adapter of the robots.
@@ -83,8 +87,9 @@ class FreeRobots:
     """
 
     def __init__(self, adapter: AnyAdapter, count: int, threads: int) -> None:
-        commands = adapter.actions.commands
-        self._rows = np.arange(count * (1 + commands)).reshape(count, 1 + commands)
+        self._alike = adapter.actuation.sections > 1
+        companions = 1 if self._alike else adapter.actions.commands
+        self._rows = np.arange(count * (1 + companions)).reshape(count, 1 + companions)
         self._batch = adapter.make_batch(adapter.settings, self._rows.size, 0, threads)
         self._adapter = type(adapter)(adapter.settings, self._batch.layout)
         self._step = DIFFERENCE * adapter.scales.travel_mm
@@ -132,25 +137,33 @@ class FreeRobots:
         return self._motion(self._batch.probe(commands), actuated_mm, self._lines_mm)
 
     def _steps(self, actuated_mm: np.ndarray) -> np.ndarray:
-        """Return by how much the companions are pulled more, ``(k, commands)`` [mm]."""
-        pulled = actuated_mm[:, : self._adapter.actions.commands] > 0
-        return np.where(pulled, -self._step, self._step)
+        """Return by how much the companions are pulled more by each command, ``(k, companions, commands)`` [mm]."""
+        pulls = actuated_mm[:, : self._adapter.actions.commands]
+        if self._alike:
+            ways = np.where(pulls.any(axis=1, keepdims=True), pulls, -1.0)
+            return np.asarray(-self._step * (ways / np.linalg.norm(ways, axis=1, keepdims=True))[:, None])
+        return np.where(pulls > 0, -self._step, self._step)[:, None] * np.eye(pulls.shape[1])
 
     def _command(self, commands: np.ndarray, rows: list[int], actuated_mm: np.ndarray) -> None:
         """Write commands of robots and their companions."""
-        count, steps = self._adapter.actions.commands, self._steps(actuated_mm)
-        places = np.repeat(actuated_mm[:, None], 1 + count, axis=1)
-        for k in range(count):
-            places[:, 1 + k, k] += steps[:, k]
+        steps = self._steps(actuated_mm)
+        places = np.repeat(actuated_mm[:, None], 1 + steps.shape[1], axis=1)
+        places[:, 1:, : steps.shape[2]] += steps
         self._adapter.write_command(commands, places.reshape(len(rows), -1), rows)
 
     def _motion(self, rows: np.ndarray, actuated_mm: np.ndarray, lines_mm: np.ndarray) -> FreeMotion:
-        """Return the motion from blocks of robots and their companions, ``(k (1 + commands), size)``."""
+        """Return the motion from blocks of robots and their companions, ``(k (1 + companions), size)``."""
         blocks, steps = rows.reshape(len(actuated_mm), -1, rows.shape[-1]), self._steps(actuated_mm)
         layout, points = self._adapter.layout, self._adapter.points(blocks, lines_mm)
         tips = layout.nodes(blocks)[..., -1, : points.shape[-1]]
-        slopes = ((ends[:, 1:] - ends[:, :1]) / _beside(steps, ends) for ends in (points, tips))
+        slopes = (self._slopes(ends[:, 1:] - ends[:, :1], steps) for ends in (points, tips))
         return FreeMotion(layout.tensions(blocks[:, 0]), *slopes)
+
+    def _slopes(self, moved: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Return slopes along each command from how far the companions have moved."""
+        if self._alike:
+            return np.asarray(_beside(steps[:, 0] / self._step**2, moved) * moved)
+        return np.asarray(moved / _beside(np.diagonal(steps, axis1=1, axis2=2), moved))
 
 
 class ForceEstimator:
