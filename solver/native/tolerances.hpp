@@ -61,10 +61,8 @@ inline constexpr double kInsertion = 11.25;      // displacement that counts as 
 inline constexpr double kMotion = 11.25;         // displacement that counts as much as a motion of obstacles by L [a]
 inline constexpr double kLoading = 2.0;          // displacement that counts as much as raising all loads [a]
 inline constexpr double kLargestStep = 0.09375;  // sub-step [a]
-inline constexpr double kMeetingStep =
-    0.01;  // sub-step in which a narrow obstacle may be met, or the side of one that a point did not face [a]
-inline constexpr double kFacing =
-    0.7;  // cosine of the angle between the normals of the side that it faced and this one
+inline constexpr double kMeetingStep = 0.01;     // sub-step that may meet a narrow obstacle, or another side of one [a]
+inline constexpr double kFacing = 0.7;           // least cosine of the angle between the sides faced and met
 inline constexpr double kSmallestStep = 1.25e-5;  // sub-step before a branch counts as ended [a]
 inline constexpr double kPatientStep =
     1e-4;  // sub-step up to which Newton's method may begin with damped iterations [a]

@@ -37,19 +37,25 @@ bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
   return false;
 }
 
-// Lets motors keep their present tension that jumps over the limit within the smallest sub-step, as where another cable
-// becomes taut, or slack that shared the load. False where there are none, or none that have not done so too often.
+// Lets those of the motors that hold a length keep their present tension. False where there are none.
 template <class Model>
-bool ModelContinuation<Model>::keep_tensions_that_jump() {
+template <class Which>
+bool ModelContinuation<Model>::keep_tensions(const Which& which) {
   bool kept = false;
   for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
-    if (problem_.keeps_tension(k) || over_limit_[k] <= problem_.robot().max_tension) continue;
-    if (jumps_[k]++ >= kJumps) continue;
+    if (problem_.keeps_tension(k) || !which(k)) continue;
     keep_tension(k);
     kept = true;
   }
   if (kept) clear_trend();
   return kept;
+}
+
+// Lets motors keep their present tension that jumps over the limit within the smallest sub-step, as where another cable
+// becomes taut, or slack that shared the load. False where there are none, or none that have not done so too often.
+template <class Model>
+bool ModelContinuation<Model>::keep_tensions_that_jump() {
+  return keep_tensions([&](int k) { return over_limit_[k] > problem_.robot().max_tension && jumps_[k]++ < kJumps; });
 }
 
 // Raises tensions to the limit that motors keep below it. False where there are none, or none that have not been raised
@@ -73,16 +79,8 @@ bool ModelContinuation<Model>::raise_kept_tensions(const Command& target) {
 // Lets the motors at the limit keep their tension, among those that some tensions exceed it of.
 template <class Model>
 bool ModelContinuation<Model>::keep_tensions_at_limit(const Tensions& over) {
-  const double limit = problem_.robot().max_tension;
-  bool kept = false;
-  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
-    if (problem_.keeps_tension(k) || let_out_[k]) continue;
-    if (over[k] <= limit || tensions_[k] < limit * (1 - kTensionBand)) continue;
-    keep_tension(k);
-    kept = true;
-  }
-  if (kept) clear_trend();
-  return kept;
+  const double limit = problem_.robot().max_tension, least = limit * (1 - kTensionBand);
+  return keep_tensions([&](int k) { return !let_out_[k] && over[k] > limit && tensions_[k] >= least; });
 }
 
 // Where the tensions of cables that are pulled jump over the limit within the smallest sub-step, as where others become
@@ -272,7 +270,7 @@ bool ModelContinuation<Model>::is_met(const Command& target, Status status) {
     clear_trend();
   }
   evaluate_present();
-  const double hidden = several ? kFeasibility * robot.max_length / robot.offset : 0.0;
+  const double hidden = several ? follow_tolerance() / robot.offset : 0.0;
   return command_distance(present_.command, target) <= std::max(hidden, kCommandResolution) &&
          highest(tensions_) <= robot.max_tension;
 }

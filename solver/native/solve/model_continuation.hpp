@@ -148,6 +148,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // Motors at the limit that keep their tension.
   double highest_held(const Tensions& tensions) const;
   bool stop_holding(const Command& wanted);
+  template <class Which>
+  bool keep_tensions(const Which& which);
   bool keep_tensions_at_limit(const Tensions& over);
   bool keep_tensions_that_jump();
   bool raise_to_limit(const Command& wanted);
