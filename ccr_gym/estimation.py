@@ -126,15 +126,16 @@ class FreeRobots:
     def move(self, robots: np.ndarray, actuated_mm: np.ndarray) -> FreeMotion:
         """Move some robots to actuated coordinates ``(k, actions)`` [mm], and return their motion there."""
         rows = self._rows[robots].ravel().tolist()
-        self._command(self._batch.commands, rows, actuated_mm)
+        steps = self._steps(actuated_mm)
+        self._command(self._batch.commands, rows, actuated_mm, steps)
         self._batch.move(rows)
-        return self._motion(self._batch.blocks[rows], actuated_mm, self._lines_mm[robots])
+        return self._motion(self._batch.blocks[rows], steps, self._lines_mm[robots])
 
     def probe(self, actuated_mm: np.ndarray) -> FreeMotion:
         """Return the motion of all robots at other actuated coordinates ``(N, actions)`` [mm]; nothing moves."""
-        commands = self._batch.commands.copy()
-        self._command(commands, self._rows.ravel().tolist(), actuated_mm)
-        return self._motion(self._batch.probe(commands), actuated_mm, self._lines_mm)
+        commands, steps = self._batch.commands.copy(), self._steps(actuated_mm)
+        self._command(commands, self._rows.ravel().tolist(), actuated_mm, steps)
+        return self._motion(self._batch.probe(commands), steps, self._lines_mm)
 
     def _steps(self, actuated_mm: np.ndarray) -> np.ndarray:
         """Return by how much the companions are pulled more by each command, ``(k, companions, commands)`` [mm]."""
@@ -144,16 +145,15 @@ class FreeRobots:
             return np.asarray(-self._step * (ways / np.linalg.norm(ways, axis=1, keepdims=True))[:, None])
         return np.where(pulls > 0, -self._step, self._step)[:, None] * np.eye(pulls.shape[1])
 
-    def _command(self, commands: np.ndarray, rows: list[int], actuated_mm: np.ndarray) -> None:
+    def _command(self, commands: np.ndarray, rows: list[int], actuated_mm: np.ndarray, steps: np.ndarray) -> None:
         """Write commands of robots and their companions."""
-        steps = self._steps(actuated_mm)
         places = np.repeat(actuated_mm[:, None], 1 + steps.shape[1], axis=1)
         places[:, 1:, : steps.shape[2]] += steps
         self._adapter.write_command(commands, places.reshape(len(rows), -1), rows)
 
-    def _motion(self, rows: np.ndarray, actuated_mm: np.ndarray, lines_mm: np.ndarray) -> FreeMotion:
+    def _motion(self, rows: np.ndarray, steps: np.ndarray, lines_mm: np.ndarray) -> FreeMotion:
         """Return the motion from blocks of robots and their companions, ``(k (1 + companions), size)``."""
-        blocks, steps = rows.reshape(len(actuated_mm), -1, rows.shape[-1]), self._steps(actuated_mm)
+        blocks = rows.reshape(len(steps), -1, rows.shape[-1])
         layout, points = self._adapter.layout, self._adapter.points(blocks, lines_mm)
         tips = layout.nodes(blocks)[..., -1, : points.shape[-1]]
         slopes = (self._slopes(ends[:, 1:] - ends[:, :1], steps) for ends in (points, tips))
@@ -175,7 +175,8 @@ class ForceEstimator:
         free_forces: Tensions that the nominal robot needs where nothing touches it, as forces on the commands,
             ``(N, commands)`` [N].
         levers: By how far the points that touch move against a unit force when a command is pulled by a unit,
-            ``(N, commands)``; 0 where nothing touches.
+            ``(N, commands)``; with several sections the projection of that onto the way of the pull. 0 where nothing
+            touches.
         learns: Whether the rigidity is unknown, and learnt from robots that nothing touches.
 
     Args:
