@@ -32,6 +32,7 @@ KktSystem<Model>::KktSystem(int segments, int mounts)
       penalty_(kMaxActive),
       mount_hessian_(mounts),
       mount_factor_(mounts),
+      mount_damping_(mounts),
       columns_(kSpace * mounts, Column{0, 0, {}, Direction(segments, 0)}),
       schur_(kSpace * kSpace * mounts * mounts),
       moves_(kSpace * mounts),
@@ -47,6 +48,13 @@ Mat<N, N> outer(double scale, const Vec<N>& a, const Vec<N>& b) {
   for (int r = 0; r < N; ++r)
     for (int c = 0; c < N; ++c) product(r, c) = scale * a[r] * b[c];
   return product;
+}
+
+template <int N>
+double largest(const Mat<N, N>& matrix) {
+  double entry = 0;
+  for (const double value : matrix.v) entry = std::max(entry, std::abs(value));
+  return entry;
 }
 
 }  // namespace
@@ -76,8 +84,11 @@ void KktSystem<Model>::assemble(const ContactProblem& problem, const ActiveSet& 
 template <class Model>
 void KktSystem<Model>::assemble_mounts(const ContactProblem& problem, const ActiveSet& active) {
   touched_ = 0;
-  arm_ = problem.robot().max_length / problem.robot().segments;
-  for (std::size_t m = 0; m < mount_hessian_.size(); ++m) mount_hessian_[m] = problem.spring(m);
+  const double arm = problem.robot().max_length / problem.robot().segments;
+  for (std::size_t m = 0; m < mount_hessian_.size(); ++m) {
+    mount_hessian_[m] = problem.spring(m);
+    mount_damping_[m] = largest(mount_hessian_[m]) / max_curvature_;
+  }
   if (mount_hessian_.empty()) return;
   for (int j = 0; j < active.count; ++j) {
     const int mount = problem.mount(active.contact[j]);
@@ -94,6 +105,7 @@ void KktSystem<Model>::assemble_mounts(const ContactProblem& problem, const Acti
     }
     const Gap<kSpace> gap = problem.gap(active.contact[j]);
     Mat<kSpace, kSpace> stiffening = gap.curvature(active.multiplier[j]);
+    mount_damping_[mount] += largest(stiffening) / max_curvature_;
     stiffening -= outer(penalty_[j], gap.slope, gap.slope);
     mount_hessian_[mount] -= stiffening;
     for (int k = 0; k < kSpace; ++k) {
@@ -102,6 +114,7 @@ void KktSystem<Model>::assemble_mounts(const ContactProblem& problem, const Acti
       columns_[first + k].forces.push_back(problem.force(active.contact[j], column));
     }
   }
+  for (double& damping : mount_damping_) damping = std::min(damping, 1 / (arm * arm));
 }
 
 template <class Model>
@@ -109,7 +122,7 @@ bool KktSystem<Model>::factor(double damping) {
   ++factorizations;
   negative = system_.factor(damping, counts_inertia ? Model::kControl * static_cast<int>(system_.stages.size()) : 0);
   if (negative < 0 || mount_hessian_.empty()) return negative >= 0;
-  const int of_mounts = factor_mounts(damping / (arm_ * arm_));
+  const int of_mounts = factor_mounts(damping);
   if (of_mounts < 0 || (of_mounts > 0 && !counts_inertia)) return false;
   negative += of_mounts;
   return true;
@@ -120,7 +133,7 @@ int KktSystem<Model>::factor_mounts(double damping) {
   int negative = 0;
   for (std::size_t m = 0; m < mount_hessian_.size(); ++m) {
     mount_factor_[m] = mount_hessian_[m];
-    for (int k = 0; k < kSpace; ++k) mount_factor_[m](k, k) += damping;
+    for (int k = 0; k < kSpace; ++k) mount_factor_[m](k, k) += mount_damping_[m] * damping;
   }
   for (int a = 0; a < touched_; ++a) {
     Column& column = columns_[a];

@@ -73,12 +73,14 @@ class KktSystem {
   System system_;
   std::vector<double> penalty_;
   std::vector<Mat<kSpace, kSpace>> mount_hessian_, mount_factor_;  // of each mount, without the chain
+  // Damping of each mount over that of the controls: as much in relation to its own stiffness, or obstacles on soft springs
+  // would hardly move.
+  std::vector<double> mount_damping_;  // [1/mm²]
   std::vector<Column> columns_;
   int touched_ = 0;            // number of columns in use
   std::vector<double> schur_;  // Schur complement as L D Lᵀ: unit L below the diagonal, D on it, (touched, touched)
   std::vector<double> moves_;  // solution in these columns
   double max_curvature_ = 0;
-  double arm_ = 1;  // lever that converts damping of controls to damping of mounts [mm]
   std::vector<typename System::Load> loads_;
 };
 
