@@ -26,7 +26,10 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   trial_.command = command;
   const double distance = command_distance(present_.command, command);
   if (!try_free_shape()) {
-    if (!Model::kRod && largest_displacement(command.cables) <= 0) return Move::kRejected;
+    if (!Model::kRod && largest_displacement(command.cables) <= 0) {
+      met_slack_ = true;
+      return Move::kRejected;
+    }
     extrapolate_trial();
     const NewtonResult found = newton_.solve(trial_, distance <= kPatientStep ? kDampedIterations : 0);
     result_.iterations += found.iterations;
@@ -41,6 +44,7 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_command(const Comma
   trial_tensions_ = problem_.tensions(trial_.active);
   const double loss = energy_loss(command);
   if (left_branch(command, moved, loss)) return Move::kRejected;
+  if (moves_obstacles(command) && pushes(trial_tensions_)) return Move::kPushing;
   const double tension = highest(trial_tensions_), limit = problem_.robot().max_tension;
   const bool pulled = pulls_cable(command) && command.length == present_.command.length && !moves_obstacles(command);
   const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out

@@ -52,19 +52,23 @@ bool ModelContinuation<Model>::only_releases(const Command& command) const {
 }
 
 // The command that is gone for: while anything touches, the cables are not slackened below a pretension, where they
-// alone give the robot its shape.
+// alone give the robot its shape. A slack robot that something meets is pulled to it first.
 template <class Model>
 ModelContinuation<Model>::Command ModelContinuation<Model>::raise_to_pretension(Command wanted) const {
   const double pretension = kPretension * problem_.robot().offset;
-  if (Model::kRod || largest_displacement(wanted.cables) >= pretension || !problem_.touches_obstacle(present_.active))
-    return wanted;
+  const bool meets = met_slack_ && (moves_obstacles(wanted) || wanted.length != present_.command.length);
+  if (Model::kRod || largest_displacement(wanted.cables) >= pretension) return wanted;
+  if (!meets && !problem_.touches_obstacle(present_.active)) return wanted;
   int taut = 0;
   for (int k = 1; k < kCables; ++k)
     if (std::abs(present_.command.cables[k]) > std::abs(present_.command.cables[taut])) taut = k;
   const double present = present_.command.cables[taut];
-  const double least = std::min(std::abs(present), pretension);
+  const double least = meets ? pretension : std::min(std::abs(present), pretension);
   if (std::abs(wanted.cables[taut]) < least) wanted.cables[taut] = std::copysign(least, present);
-  return wanted;
+  if (!meets || std::abs(present) >= pretension) return wanted;
+  Command pulled = present_.command;
+  pulled.cables = wanted.cables;
+  return pulled;
 }
 
 #define CCR_INSTANTIATE(Model)                                                                             \

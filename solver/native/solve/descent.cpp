@@ -49,6 +49,10 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
   present_evaluated_ = false;
   clear_trend();
   evaluate_present();
+  if (problem_.is_moving() && pushes(tensions_)) {
+    result_.reason = Reason::kStuck;
+    return undo_descent(End::kStuck);
+  }
   const bool unwinds = problem_.keeps_tensions() && unwound_cable() >= 0;
   if (highest(tensions_) > problem_.robot().max_tension || (unwinds && motor_holds)) {
     if (motor_holds) {

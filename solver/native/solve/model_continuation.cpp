@@ -135,6 +135,7 @@ template <class Model>
 Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
   newton_.begin_step();
   over_limit_ = {}, let_out_ = {}, jumps_ = {};
+  met_slack_ = false;
   const double limit = problem_.robot().max_tension;
   for (int sub = 0; sub < kSubSteps && !work_is_spent(); ++sub) {
     // A release may lead to more tension than a motor holds: it yields until it holds again.
@@ -184,11 +185,14 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
   const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
   Move move = Move::kOverTension;
+  const bool had_met = met_slack_;
   if (!stalled)
     move = problem_.keeps_tensions() ? try_below(ceiling(pursuit.wanted, goal, size / remaining), next)
                                      : try_command(next);
+  if (met_slack_ && !had_met) return true;  // to be pulled first
+  if (move == Move::kPushing) return give_way(pursuit, next, size, true);
   if (move == Move::kOverTension && moves_obstacles(next)) {
-    if (layout_.cables.size == 1) return give_way(pursuit, next, size);
+    if (layout_.cables.size == 1) return give_way(pursuit, next, size, false);
     move = Move::kAccepted;  // what the motors cannot hold then, they let out
   }
   if (move == Move::kAccepted) {
@@ -231,11 +235,12 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   return true;
 }
 
-// One sub-step in which obstacles press so much that the motor has to let the cable out; false where they cannot go on.
+// One sub-step in which obstacles press so much that the motor has to let the cable out, or that the cable would have to
+// push; false where they cannot go on.
 template <class Model>
-bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, double size) {
-  pursuit.holds = true;
-  if (pay_out(next)) {
+bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, double size, bool pushing) {
+  pursuit.holds = !pushing;
+  if (!pushing && pay_out(next)) {
     pursuit.step = pursuit.refined ? size : std::min(2 * size, kLargestStep);
     pursuit.refined = false;
   } else {

@@ -55,7 +55,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Optimality optimality(const double* block) override;
 
  private:
-  enum class Move { kAccepted, kRejected, kOverTension };
+  enum class Move { kAccepted, kRejected, kOverTension, kPushing };
   enum class Conflict { kNone, kTight, kBlocked };
   enum class End { kPassed, kSnapped, kStuck, kOverTension };
 
@@ -78,7 +78,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool is_met(const Command& target, Status status);
   bool resume(Pursuit& pursuit);
   bool advance(Pursuit& pursuit, const Command& goal, double remaining);
-  bool give_way(Pursuit& pursuit, const Command& next, double size);
+  bool give_way(Pursuit& pursuit, const Command& next, double size, bool pushing);
   bool refine(Pursuit& pursuit, double size, bool blocked);
   Command raise_to_pretension(Command wanted) const;
   Move try_command(const Command& command);
@@ -136,6 +136,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool peaks_at_limit(const Command& goal, double remaining);
   bool approach_tension_limit();
   void share_motion(Command& goal, bool holds) const;
+  bool pushes(const Tensions& tensions) const;
   bool pay_out(const Command& command);
   bool hold_stalled_cables(Command& wanted) const;
   bool yield_cables(Command& wanted, double least) const;
@@ -214,6 +215,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Command at_contact_{};                    // and a command under which the robot touches
   Iterate last_held_;          // the last equilibrium of the step that the motors held, where a later one was not
   bool was_exceeded_ = false;  // whether there is one
+  bool met_slack_ = false;  // whether something met the robot of the paper's model while its cables were slack
 
   std::vector<Position> nodes_;  // of the block last read
   std::vector<Frame> frames_;

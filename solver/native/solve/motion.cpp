@@ -117,6 +117,13 @@ bool ModelContinuation<Model>::pay_out(const Command& command) {
   return false;
 }
 
+// Whether the cable of the paper's model, which knows none that is slack, would have to push.
+template <class Model>
+bool ModelContinuation<Model>::pushes(const Tensions& tensions) const {
+  const Robot& robot = problem_.robot();
+  return !Model::kRod && kSpace == 2 && tensions[0] < -kPush * robot.rigidity / (robot.offset * robot.max_length);
+}
+
 #define CCR_INSTANTIATE(Model)                                                                                        \
   template void ContactProblem<Model>::move_obstacles(std::span<const Obstacle>, std::span<const double>);            \
   template void ContactProblem<Model>::place_obstacles(double);                                                       \
@@ -124,6 +131,7 @@ bool ModelContinuation<Model>::pay_out(const Command& command) {
   template StepResult ModelContinuation<Model>::move(const double*, const double*, std::span<const Obstacle<kSpace>>, \
                                                      std::span<const double>, double*);                               \
   template void ModelContinuation<Model>::share_motion(Command&, bool) const;                                         \
+  template bool ModelContinuation<Model>::pushes(const Tensions&) const;                                              \
   template bool ModelContinuation<Model>::pay_out(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
