@@ -20,7 +20,9 @@ class Status(IntEnum):
     The cable moved as far as the limit. Where a rod has several, the others go on as far as commanded: a
     motor at its limit cannot hold, so it keeps its tension and its cable's length follows, in or out. Each motor then
     either has met its command, or is at its limit; only where one has let out all of its cable it holds, and others
-    stop short. A command that every cable has met at the end is not reported as stalled, whatever happened on the way.
+    stop short. So do the motors of a rod, even a single one, while its base inserts it; the base of the paper's models
+    stops with them. A command that every cable has met at the end is not reported as stalled, whatever happened on the
+    way.
 
     In the paper's model of space, cables at the limit hold still, and a step may end below the limit with this status.
 

@@ -22,11 +22,11 @@ double ModelContinuation<Model>::highest_held(const Tensions& tensions) const {
 
 // Where pulling on leads beyond the limit: lets the motors keep their tension that are at the limit then, or else
 // raises it to there, or else lets those that jump over it keep what they have, which is raised in the end, or else
-// lets all that are at the limit. False where there are none but those that do, or one cable.
+// lets all that are at the limit. False where there are none but those that do, or one cable while the base stands.
 template <class Model>
 bool ModelContinuation<Model>::stop_holding(const Command& wanted) {
   if constexpr (Model::kRod) {
-    if (layout_.cables.size == 1) return false;
+    if (layout_.cables.size == 1 && !moves_base(wanted)) return false;
     evaluate_present();
     if (highest_held(tensions_) > problem_.robot().max_tension) return false;
     if (keep_tensions_at_limit(over_limit_) || raise_to_limit(wanted) || keep_tensions_that_jump()) return true;
@@ -90,7 +90,7 @@ bool ModelContinuation<Model>::raise_to_limit(const Command& wanted) {
   const double limit = problem_.robot().max_tension, aim = limit * (1 - kTensionBand / 2);
   bool raised = false;
   for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k) {
-    if (problem_.keeps_tension(k) || over_limit_[k] <= limit || !pulls_in(wanted, k)) continue;
+    if (problem_.keeps_tension(k) || let_out_[k] || over_limit_[k] <= limit || !pulls_in(wanted, k)) continue;
     raised |= raise_tension(k, aim, wanted.cables[k]);
   }
   return raised;

@@ -100,6 +100,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool pulls_cable(const Command& command) const;
   bool only_releases(const Command& command) const;
   bool moves_obstacles(const Command& command) const { return command.scene != present_.command.scene; }
+  bool moves_base(const Command& command) const { return command.length != present_.command.length; }
   bool work_is_spent() const {
     return result_.interrupted || newton_.factorizations() - factorizations_before_ > tolerances::kWork;
   }

@@ -168,7 +168,8 @@ bool ModelContinuation<Model>::find_holding_set(const Command& command, ActiveSe
 template <class Model>
 bool ModelContinuation<Model>::is_blocked(const Command& command) {
   const Robot& robot = problem_.robot();
-  if (present_.active.count > 0 && !is_tight() && std::isfinite(robot.max_tension) && !moves_obstacles(command))
+  if (present_.active.count > 0 && !is_tight() && std::isfinite(robot.max_tension) && !moves_obstacles(command) &&
+      !(Model::kRod && moves_base(command)))
     return false;
   ActiveSet holding;
   if (!find_holding_set(command, holding)) return false;

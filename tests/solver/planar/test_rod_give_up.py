@@ -57,7 +57,6 @@ SNAPS_AT_THE_LIMIT = replace(
     max_cable_mm=2.5,
     cables=(Cable(offset_mm=0.7497871118287467, end=13), Cable()),
 )
-DRAWN = replace(INSERTED, length_mm=166.41997150577146, segments=9, between=0, max_tension=15.0, cables=(Cable(),))
 
 
 def follow(robot, *commands, scene=()):
@@ -141,19 +140,10 @@ def test_a_descent_slides_along_a_contact_that_presses_it_less_and_less():
             Circle(center=(2.510856434939581, 12.106145683892619), radius=0.47958951537226735),
             (((0.003979781339305894, 1.2016331899014785), 15.868367893898117),),
         ),
-        (
-            DRAWN,
-            Circle(center=(66.65492141642308, 138.9875896063145), radius=20.842150888808142, spring=28.18725181223074),
-            (
-                (11.171537339649534, 160.3680788378049),
-                (17.213975664383906, 160.22178476711085),
-            ),
-        ),
     ],
     ids=[
         "the tension falls before the robot meets a peg",
         "a stalled cable is let go by another",
-        "the tension falls behind a peak as the robot is drawn",
     ],
 )
 def test_a_stall_is_where_a_repeated_command_leads_no_farther(robot, peg, commands):
