@@ -286,14 +286,18 @@ def _blocked(solver, taken, tally):
 
 
 def _other_ways(solver, taken, k):
-    """Return whether a blocked command, or its tension limit, is reached in small steps or in another way."""
-    before, command = taken.states[k], taken.commands[k]
+    """Return whether a blocked command, or its tension limit, is reached in small steps or in another way.
+
+    That from rest may go round the other side of what keeps a robot where closed gaps balance each other.
+    """
+    before, after, command = taken.states[k], taken.states[k + 1], taken.commands[k]
     start = command_of(before)
     small = np.linspace(start, command, 41)[1:]
     corner = [np.array([command[0], *start[1:]]), command]
     straight = np.linspace(command_of(solver.rest()), command, 81)[1:]
-    ways = (before, small), (before, corner), (solver.rest(), straight)
-    return any(_passes(solver, *way) for way in ways)
+    if _passes(solver, before, small) or _passes(solver, before, corner):
+        return True
+    return _passes(solver, solver.rest(), straight) and not is_wedged(after, command)
 
 
 def _passes(solver, state, commands):

@@ -26,8 +26,8 @@ def wedge(state, command):
     """Return ``|Gᵀν − Aᵀy|`` over the slopes, where Σν = 1, and ``yᵀ h_p dp`` of a command [mm]."""
     unknowns, parameters = state._node_point()
     _, shapes, shape_slopes, clearance, slopes = (part.full() for part in state._derivatives(unknowns, parameters))
-    limits = len(clearance) - state.gaps[:, :, 1:].size
-    closed = limits + np.flatnonzero(clearance[limits:] <= CLOSED * state.robot.longest_mm)
+    cables = len(state.robot.cables) if state.robot.model == "rod" else 0  # which motors let out; disks that meet hold
+    closed = cables + np.flatnonzero(clearance[cables:] <= CLOSED * state.robot.longest_mm)
     if not closed.size:
         return np.inf, 0.0
     slopes = slopes[closed].T

@@ -144,6 +144,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   void wait_for_motors(Command& goal) const;
   bool is_unyielding() const;
   bool is_blocked(const Command& command);
+  bool closes(const ActiveSet& holding, const Command& command);
   bool find_holding_set(const Command& command, ActiveSet& holding);
   void keep_last_held(const Iterate& held);
 

@@ -187,7 +187,22 @@ bool ModelContinuation<Model>::is_blocked(const Command& command) {
   for (std::size_t m = 0; m < present_.mounts.size(); ++m)
     balance =
         std::max(balance, robot.max_length / robot.segments * norm(problem_.mount_load(holding, static_cast<int>(m))));
-  return balance <= kBalance * pressed;
+  return balance <= kBalance * pressed && closes(holding, command);
+}
+
+// Whether a command closes gaps, weighted by multipliers, in the shape that is.
+template <class Model>
+bool ModelContinuation<Model>::closes(const ActiveSet& holding, const Command& command) {
+  trial_ = present_;
+  trial_.command = between(present_.command, command, kSmallestPart);
+  const auto weighted_gaps = [&](const Iterate& at) {
+    double sum = 0;
+    if (!problem_.evaluate(at)) return sum;
+    for (int j = 0; j < holding.count; ++j) sum += holding.multiplier[j] * problem_.gaps()[holding.contact[j]];
+    return sum;
+  };
+  const double before = weighted_gaps(present_);
+  return weighted_gaps(trial_) < before;
 }
 
 #define CCR_INSTANTIATE(Model)                                                    \
