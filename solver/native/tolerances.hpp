@@ -57,7 +57,7 @@ inline constexpr double kNormDamping = 1.0;  // of the norm that measures closen
 
 // Continuation.
 inline constexpr double kPretension = 0.00625;   // a robot in contact is not slackened below this displacement [a]
-inline constexpr double kPush = 1e-9;  // tension below zero that is roundoff [EI/aL]
+inline constexpr double kPush = 1e-9;            // tension below zero that is roundoff [EI/aL]
 inline constexpr double kInsertion = 11.25;      // displacement that counts as much as an insertion by L [a]
 inline constexpr double kMotion = 11.25;         // displacement that counts as much as a motion of obstacles by L [a]
 inline constexpr double kLoading = 2.0;          // displacement that counts as much as raising all loads [a]

@@ -105,13 +105,14 @@ class Solver(CommandCheck):
             scene: Where the obstacles move to within the step, at a proportional rate: the equilibrium's scene, each
                 obstacle shifted or of other sizes. The equilibrium need not be of this solver's scene then. Where the
                 obstacles press so hard that the motor cannot hold the cable, it pays the cable out at the tension
-                limit; where that does not help, they stop.
+                limit; where that does not help, or the cable of the paper's model, which is never slack, would have to
+                push, they stop.
 
         Returns:
             The equilibrium reached; its ``status`` says how. While anything touches, the cable of the paper's model is
             not slackened below a pretension of 0.00625 of ``robot.offset_mm``, where the shape would be undetermined;
-            a slack robot that is inserted into an obstacle ends in ``GAVE_UP``. Its ``scene`` is where the obstacles
-            are: the scene they move to, unless they had to stop, ``BLOCKED``.
+            a slack one that meets an obstacle is pulled to it first. Its ``scene`` is where the obstacles are: the
+            scene they move to, unless they had to stop, ``BLOCKED``.
 
         Raises:
             ValueError: If a command is out of range or the equilibrium is another robot's or scene's.

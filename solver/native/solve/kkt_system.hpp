@@ -73,8 +73,8 @@ class KktSystem {
   System system_;
   std::vector<double> penalty_;
   std::vector<Mat<kSpace, kSpace>> mount_hessian_, mount_factor_;  // of each mount, without the chain
-  // Damping of each mount over that of the controls: as much in relation to its own stiffness, or obstacles on soft springs
-  // would hardly move.
+  // Damping of each mount over that of the controls: as much in relation to its own stiffness, or obstacles on soft
+  // springs would hardly move.
   std::vector<double> mount_damping_;  // [1/mm²]
   std::vector<Column> columns_;
   int touched_ = 0;            // number of columns in use

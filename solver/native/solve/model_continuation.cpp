@@ -235,8 +235,8 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
   return true;
 }
 
-// One sub-step in which obstacles press so much that the motor has to let the cable out, or that the cable would have to
-// push; false where they cannot go on.
+// One sub-step in which obstacles press so much that the motor has to let the cable out, or that the cable would have
+// to push; false where they cannot go on.
 template <class Model>
 bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, double size, bool pushing) {
   pursuit.holds = !pushing;

@@ -217,7 +217,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Command at_contact_{};                    // and a command under which the robot touches
   Iterate last_held_;          // the last equilibrium of the step that the motors held, where a later one was not
   bool was_exceeded_ = false;  // whether there is one
-  bool met_slack_ = false;  // whether something met the robot of the paper's model while its cables were slack
+  bool met_slack_ = false;     // whether something met the robot of the paper's model while its cables were slack
 
   std::vector<Position> nodes_;  // of the block last read
   std::vector<Frame> frames_;

@@ -69,14 +69,22 @@ def test_cable_holds_where_the_wall_bends_the_robot_the_other_way():
     assert solver.step(stalled, 0.0, 148).status is Status.CONVERGED
 
 
-@EVERY_MODEL
-def test_straight_robot_is_blocked_head_on(model):
+def test_straight_rod_is_blocked_head_on():
     """Nothing tells it which way to give."""
-    solver = Solver(robot_with(model), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
+    solver = Solver(robot_with("rod"), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
     blocked = inserted(solver, (0.0, 155))
     assert blocked.status is Status.BLOCKED
     assert blocked.length_mm == pytest.approx(150, abs=1e-3)
     assert np.array_equal(solver.step(blocked, 0.0, 120).block, solver.rest().block)
+
+
+def test_slack_robot_of_the_papers_model_gives_way_under_its_pretension():
+    solver = Solver(robot_with("paper"), Scene([HalfPlane(point=(0, 150), normal=(0, -1))]))
+    bent = inserted(solver, (0.0, 155))
+    assert bent.status is Status.CONVERGED
+    assert bent.cable_mm == pytest.approx(0.00625 * solver.robot.offset_mm, rel=1e-9)
+    assert bent.contact.any()
+    assert np.array_equal(solver.step(bent, 0.0, 120).block, solver.rest().block)
 
 
 def test_buckled_robot_is_pulled_back_straight():

@@ -188,6 +188,47 @@ def test_obstacles_stop_where_they_would_crush_the_robot():
     assert back.scene == walls
 
 
+@pytest.mark.parametrize("parts", [1, 10, 200])
+def test_obstacles_stop_where_the_cable_of_the_papers_model_would_push(parts):
+    """Between two circles that close in, the tension falls from 1.2 N; that model knows no slack cable."""
+    solver = Solver(
+        Robot.prototype(model="paper", max_tension=6.0),
+        Scene(
+            [
+                Circle(center=(34.83596032732177, 131.95657732709188), radius=12.331042199286625),
+                Circle(center=(-34.37504537371748, 125.79977166646958), radius=10.376749748180693),
+            ]
+        ),
+    )
+    there = Scene(o.shifted((dx, 0.0)) for o, dx in zip(solver.scene, (-20.9589253, 21.246699), strict=True))
+    state = solver.step(solver.rest(), 2.7623959207524678)
+    for k in range(1, parts + 1):
+        state = solver.step(state, state.cable_mm, scene=solver.scene.moved_towards(there, k / parts))
+        assert checked(solver.robot, state) in (Status.CONVERGED, Status.BLOCKED)
+        assert state.tension >= 0
+    assert state.status is Status.BLOCKED
+    assert state.scene.obstacles[0].center[0] == pytest.approx(14.8267, abs=2e-4)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("spring", [None, 5.0])
+@pytest.mark.parametrize("parts", [1, 20])
+def test_a_slack_robot_gives_way_to_an_obstacle(model, spring, parts):
+    """All its segments may shear or bend by -0.12 rad, which leaves 4 mm of clearance at no change in cable length."""
+    disc = Circle(center=(-25.0, 100.0), radius=12.0, spring=spring)
+    solver = Solver(robot_of(model), Scene([disc]))
+    there, state = shifted(solver.scene, (21.0, 0.0)), solver.rest()
+    for k in range(1, parts + 1):
+        state = solver.step(state, 0.0, scene=solver.scene.moved_towards(there, k / parts))
+        assert checked(solver.robot, state) in (Status.CONVERGED, Status.SNAPPED)
+    assert state.scene == there
+    assert state.nodes[:, 0].max() > 4.0
+    assert state.cable_mm <= 0.00625 * solver.robot.offset_mm  # the pretension of the paper's model
+    away = solver.step(state, 0.0, scene=solver.scene)
+    assert away.cable_mm == 0.0
+    assert abs(away.nodes[:, 0]).max() < 1e-9
+
+
 @EVERY_MODEL
 @pytest.mark.parametrize("across", [-90.0, -60.0, 90.0])
 def test_no_obstacle_passes_through_the_robot(model, across):

@@ -104,3 +104,11 @@ def test_the_check_sees_the_one_step_that_passed_a_circle():
     states = [free.step(free.rest(), cable) for cable in np.linspace(0.01, 11.3, 200)]
     points = np.stack([state.points for state in states])
     assert CoreCheck(ROBOT, Scene([circle])).swept(points, np.zeros((200, 1, 2))).any()
+
+
+def test_a_robot_whose_disks_meet_at_a_corner_is_wedged():
+    """Drawn back, it cannot bend on round the corner between two of its points: BLOCKED, as its closed gaps confirm."""
+    tally, cases = play(Episode("rod", 1150, 1761, 500))
+    assert {case["kind"] for case in cases} == {"blocked"}
+    assert tally.blocked == 3
+    assert tally.blocked_unconfirmed == 0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Circle, HalfPlane, Robot, Scene, Solver, Status
+from solver import Capsule, Circle, HalfPlane, Polygon, Robot, Scene, Solver, Status
 from solver.common.robot import MODELS
 from solver.planar.forces import force_true
 from solver.planar.free import free_nodes
@@ -93,3 +93,28 @@ def test_let_go_the_obstacle_returns_to_its_place():
 def test_bad_stiffness_is_refused(spring, message):
     with pytest.raises(ValueError, match=message):
         replace(CIRCLE, spring=spring)
+
+
+def test_robot_rolls_past_an_obstacle_on_a_soft_spring():
+    """The descent has to move obstacles fast whose springs are softer by far than the robot."""
+    corners = (
+        (29.708088486204776, 120.2044478660963),
+        (37.38646048042019, 107.09659235269643),
+        (49.169474735228846, 105.79827812957964),
+        (59.31078724426851, 116.10881237589773),
+        (58.52195553648005, 126.51373817466254),
+        (47.07095814773226, 135.158460498289),
+        (35.44403335476555, 132.0818382712314),
+    )
+    soft = Polygon(corners=corners, radius=7.50484287702009, spring=0.006021656561407207)
+    stiff = Capsule(
+        start=(66.92016589075972, 174.82340795085702),
+        end=(42.95299442399343, 181.0803377917917),
+        radius=12.62464431823938,
+        spring=392.154624193634,
+    )
+    solver = Solver(Robot.prototype(touch=("backbone", "cable", "rim")), Scene([soft, stiff]))
+    rolled = solver.step(solver.rest(), 8.186564456280223)
+    assert rolled.status is Status.SNAPPED
+    assert rolled.cable_mm == 8.186564456280223
+    assert rolled.factorizations < 1500
