@@ -1,0 +1,47 @@
+"""Configuration of Sphinx; ``make docs`` builds the pages to ``build/docs``."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE / "_extensions"), str(HERE.parent)]
+
+from ccr_gym import __version__  # noqa: E402 - from the repository that the pages are about
+
+project = "ccr-gym"
+author = "The ccr-gym authors"
+copyright = "The ccr-gym authors"
+version = release = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "environment_pages",
+    "api_pages",
+]
+exclude_patterns = ["_extensions"]
+suppress_warnings = ["toc.empty_glob", "myst.header"]  # the benchmark page is written by `ccr-gym evaluate`
+nitpick_ignore_regex = [("py:.*", ".*")]  # types of other packages: pages are built without a connection
+myst_enable_extensions = ["attrs_inline", "colon_fence"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"
+autodoc_class_signature = "mixed"
+autodoc_default_options = {"members": True, "inherited-members": "ABC,Env,VectorEnv,VecEnv,tuple,int,Generic,Protocol"}
+autodoc_preserve_defaults = True
+napoleon_use_ivar = True
+napoleon_numpy_docstring = False
+default_role = "literal"
+python_display_short_literal_types = True
+add_module_names = False
+
+html_theme = "furo"
+html_title = f"ccr-gym {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sourcelink = False
