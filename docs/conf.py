@@ -37,6 +37,7 @@ napoleon_use_ivar = True
 napoleon_numpy_docstring = False
 default_role = "literal"
 python_display_short_literal_types = True
+python_use_unqualified_type_names = True
 add_module_names = False
 
 html_theme = "furo"

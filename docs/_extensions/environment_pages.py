@@ -18,6 +18,7 @@ import ccr_gym
 from agents import NewtonController
 
 SEED, STEPS = 3, 40  # of the picture
+SCENE = 0.09, 0.72, 0.83  # top, bottom and right end of the robot among its obstacles, as parts of a picture
 SENSINGS = "ideal", "realistic", "sensorless"
 ROLE = re.compile(r":(\w+):`")
 Environment = gymnasium.Env[Any, Any]
@@ -41,7 +42,7 @@ def index() -> str:
     """Return the page that lists all environments."""
     rows = [["", "id", "what it asks"]]
     for env_id, env_class in ccr_gym.ENV_IDS.items():
-        rows.append([f"![]({_picture(env_id)}){{width=150px}}", f"[{env_id}]({_name(env_id)}.md)", summary(env_class)])
+        rows.append([f"![]({_picture(env_id)[:-4]}.scene.png){{width=170px}}", f"[{env_id}]({_name(env_id)}.md)", summary(env_class)])
     contents = "\n".join(_name(env_id) for env_id in ccr_gym.ENV_IDS)
     return f"""# Environments
 
@@ -68,7 +69,7 @@ def page(env_id: str, folder: Path) -> str:
     extra = {
         "Observation Space": f"Where the entries are with each `sensing`:\n\n{table(list(slices(env_id)))}",
         "Rewards": table(list(rewards(env, terms))),
-        "Arguments": arguments(env),
+        "Arguments": arguments(gymnasium.make(env_id)),
     }
     body = "\n\n".join(f"## {name}\n\n{section}\n\n{extra.get(name, '')}" for name, section in text.items())
     return f"""# {env_id}
@@ -102,7 +103,11 @@ def play(env: Environment, path: Path) -> dict[str, float]:
     policy.reset(env)
     for _ in range(STEPS):
         observation, _, _, _, info = env.step(policy.act(observation))
-    imageio.imwrite(path, env.render())
+    picture = env.render()
+    height, width = picture.shape[:2]
+    top, bottom, right = (round(part * size) for part, size in zip(SCENE, (height, height, width), strict=True))
+    imageio.imwrite(path, picture)
+    imageio.imwrite(path.with_suffix(".scene.png"), picture[top:bottom, :right])
     return {name: float(info[name]) for name in info if name.startswith("reward_")}
 
 
@@ -143,7 +148,7 @@ def rewards(env: Environment, terms: Mapping[str, float]) -> Iterator[list[str]]
     meaning = described(type(weights))
     yield ["term", "weight", "meaning", "in the picture"]
     for field in dataclasses.fields(weights):
-        value = f"{terms[f'reward_{field.name}']:.3f}"
+        value = f"{round(terms[f'reward_{field.name}'], 3) + 0.0:g}"  # no −0
         yield [f"`{field.name}`", f"{getattr(weights, field.name):g}", meaning[field.name], value]
 
 
