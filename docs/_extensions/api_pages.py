@@ -30,7 +30,9 @@ def prepare(app: Sphinx, what: str, name: str, thing: Any, options: object, line
         lines[1:] = ["", "Pages: " + ", ".join(f":doc:`CCR/{name} </environments/{name}>`" for name in ids), ""]
         return
     for k, line in enumerate(lines):
-        lines[k] = "".join(part if part.startswith(("`", ":")) else MARKUP.sub(r"\\\1", part) for part in LITERAL.split(line))
+        lines[k] = "".join(
+            part if part.startswith(("`", ":")) else MARKUP.sub(r"\\\1", part) for part in LITERAL.split(line)
+        )
 
 
 def check(env: BuildEnvironment) -> None:

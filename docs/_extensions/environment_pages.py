@@ -42,7 +42,13 @@ def index() -> str:
     """Return the page that lists all environments."""
     rows = [["", "id", "what it asks"]]
     for env_id, env_class in ccr_gym.ENV_IDS.items():
-        rows.append([f"![]({_picture(env_id)[:-4]}.scene.png){{width=170px}}", f"[{env_id}]({_name(env_id)}.md)", summary(env_class)])
+        rows.append(
+            [
+                f"![]({_picture(env_id)[:-4]}.scene.png){{width=170px}}",
+                f"[{env_id}]({_name(env_id)}.md)",
+                summary(env_class),
+            ]
+        )
     contents = "\n".join(_name(env_id) for env_id in ccr_gym.ENV_IDS)
     return f"""# Environments
 
