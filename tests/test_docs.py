@@ -24,7 +24,7 @@ def test_page_shows_what_is_printed(name, tmp_path):
 
 
 def test_first_example_shows_a_contact_and_a_force():
-    assert re.search(r"touch: \[\d+\] force \[N\]: \[\s*-0\.\d", SHOWN["index 0"][1])
+    assert re.search(r"node \[\d+\] force \[N\] \[\s*-0\.\d", SHOWN["index 0"][1])
 
 
 def test_animation_is_small():

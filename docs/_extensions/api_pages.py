@@ -29,10 +29,12 @@ def prepare(app: Sphinx, what: str, name: str, thing: Any, options: object, line
         ids = [env_id.split("/")[-1] for env_id, env_class in ccr_gym.ENV_IDS.items() if env_class is thing]
         lines[1:] = ["", "Pages: " + ", ".join(f":doc:`CCR/{name} </environments/{name}>`" for name in ids), ""]
         return
-    for k, line in enumerate(lines):
-        lines[k] = "".join(
-            part if part.startswith(("`", ":")) else MARKUP.sub(r"\\\1", part) for part in LITERAL.split(line)
-        )
+    lines[:] = ["".join(map(_escaped, LITERAL.split(line))) for line in lines]
+
+
+def _escaped(part: str) -> str:
+    """Return a part of a line with its stars and bars escaped, unless it is a literal or a role."""
+    return part if part.startswith(("`", ":")) else MARKUP.sub(r"\\\1", part)
 
 
 def check(env: BuildEnvironment) -> None:

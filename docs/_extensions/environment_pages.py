@@ -42,19 +42,14 @@ def index() -> str:
     """Return the page that lists all environments."""
     rows = [["", "id", "what it asks"]]
     for env_id, env_class in ccr_gym.ENV_IDS.items():
-        rows.append(
-            [
-                f"![]({_picture(env_id)[:-4]}.scene.png){{width=170px}}",
-                f"[{env_id}]({_name(env_id)}.md)",
-                summary(env_class),
-            ]
-        )
+        thumbnail = f"![]({_picture(env_id).replace('.png', '.scene.png')}){{width=170px}}"
+        rows.append([thumbnail, f"[{env_id}]({_name(env_id)}.md)", summary(env_class)])
     contents = "\n".join(_name(env_id) for env_id in ccr_gym.ENV_IDS)
     return f"""# Environments
 
-Every episode begins with the straight robot and ends after a fixed number of steps; no state is terminal. Each page below says what
-is observed, rewarded and sampled, and lists all arguments. `-Paper-v1` is the paper's system to the letter; all others
-use the rod ([the models](../model.md)).
+Every episode begins with the straight robot and ends after a fixed number of steps; no state is terminal. Each page
+below says what is observed, rewarded and sampled, and lists all arguments. `-Paper-v1` is the paper's system to the
+letter; all others use the rod ([the models](../model.md)).
 
 {table(rows)}
 
@@ -129,8 +124,8 @@ def overview(env_id: str) -> str:
         ["class", f"{{py:class}}`ccr_gym.{ccr_gym.ENV_IDS[env_id].__name__}`"],
         ["model, estimator, regulated force", f"`{settings.model}`, `{settings.estimator}`, `{settings.regulate}`"],
     ]
-    note = "\n\nThe numbers in the text below are those of the rod; the tables and the picture are those of this environment."
-    return table(rows) + (note if "-Paper-" in env_id else "")
+    note = "The numbers in the text below are those of the rod; tables and picture are those of this environment."
+    return table(rows) + (f"\n\n{note}" if "-Paper-" in env_id else "")
 
 
 def slices(env_id: str) -> Iterator[list[str]]:
