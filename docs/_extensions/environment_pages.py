@@ -134,7 +134,7 @@ def slices(env_id: str) -> Iterator[list[str]]:
     yield ["key", *(f'`"{sensing}"`' for sensing in SENSINGS)]
     for key in sorted({key for env in envs for key in env.observation_slices}):
         yield [f"`{key}`", *(_span(env.observation_slices.get(key)) for env in envs)]
-    yield ["length", *(str(env.observation_space.shape[0]) for env in envs)]
+    yield ["all", *(str(env.observation_space.shape[0]) for env in envs)]
 
 
 def _span(columns: slice | None) -> str:
@@ -194,8 +194,14 @@ def described(kind: type[Any]) -> dict[str, str]:
         text = inspect.cleandoc(base.__dict__.get("__doc__") or "")
         _, _, block = text.partition("\nAttributes:\n")
         entries = re.findall(r"^    (\w+): (.*(?:\n        .*)*)", block.split("\n\n")[0], re.MULTILINE)
-        found |= {name: markdown(" ".join(meaning.split())) for name, meaning in entries}
+        found |= {name: _completed(markdown(" ".join(text.split())), found.get(name, "")) for name, text in entries}
     return found
+
+
+def _completed(meaning: str, inherited: str) -> str:
+    """Return a meaning with that of the base class in place of a reference to it."""
+    reference, _, rest = meaning.partition("; ")
+    return f"{inherited} {rest[:1].upper()}{rest[1:]}" if reference.startswith("As of") else meaning
 
 
 def markdown(text: str) -> str:
