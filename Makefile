@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test coverage lint native sanitize address thread bench instructions soak clients clean
+.PHONY: demo test coverage lint docs native sanitize address thread bench instructions soak clients clean
 
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
@@ -31,6 +31,9 @@ lint: $(INSTALL)
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror $(CXX_FILES)
 	$(BIN)/mypy
+
+docs: $(INSTALL)  ## the documentation, in build/docs; warnings are errors
+	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -q -W --keep-going -b html docs build/docs
 
 native: $(INSTALL)  ## tests of the kernel in C++ (needs doctest: apt-get install doctest-dev)
 	$(NATIVE) build/native
