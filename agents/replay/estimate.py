@@ -6,6 +6,7 @@ import numpy as np
 
 from agents.estimation.robot import Knowledge, RobotEstimator
 from agents.replay.commands import commands_mm
+from agents.replay.correction import CORRECTION_ERROR, corrections
 from agents.replay.log import Log
 from agents.replay.model import AnyEquilibrium, Model, followed, positions
 from agents.replay.observations import check_commands, observations, settings_of
@@ -14,6 +15,8 @@ from agents.replay.seen import seen_shapes
 from agents.replay.sensing import Instruments
 from ccr_gym import Scales
 from solver import Scene
+
+FORCE = ("force", "force_std")  # of agents.Knowledge
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,7 @@ class Estimates:
         return np.asarray(np.sqrt(np.mean(np.sum((found[late] - self.log.positions_mm) ** 2, axis=-1), axis=-1)))
 
 
-def estimate(log: Log, robot: AnyRobot, scene: Scene, instruments: Instruments, name: str = "log") -> Estimates:
+def estimate_log(log: Log, robot: AnyRobot, scene: Scene, instruments: Instruments, name: str = "log") -> Estimates:
     """Return what a log tells of shape, contacts and contact force.
 
     Each row is estimated from the rows up to it, as on the running robot.
@@ -82,10 +85,11 @@ def estimate(log: Log, robot: AnyRobot, scene: Scene, instruments: Instruments, 
     estimator = RobotEstimator(settings, 1)
     rows = observations(log, settings, scene, commands, seen.shapes)
     known = tuple(estimator.update_one(observation) for observation in rows)
+    ratio = corrections(log, robot, scene, commands, nominal)
     cables = scales.travel_mm * np.array([entry.cables for entry in known])
     shapes = tuple(Model(robot, scene).path(cables))
-    force = scales.force_n * np.array([float(entry.force) for entry in known])
-    deviation = scales.force_n * np.array([float(entry.force_std) for entry in known])
+    read, spread = (scales.force_n * np.array([float(getattr(k, name)) for k in known]) for name in FORCE)
+    force, deviation = ratio * read, np.hypot(ratio * spread, CORRECTION_ERROR * (ratio - 1) * read)
     shares = np.array([_shares(*pair) for pair in zip(shapes, nominal, strict=True)])
     return Estimates(log, commands, known, scales, force, deviation, force[:, None, None] * shares, shapes)
 

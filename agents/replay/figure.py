@@ -18,13 +18,12 @@ FORCE, MEASURED, SHAPE = "C0", "C1", "#1f3a7a"
 SHOWN = 5  # earlier shapes beside that of the largest force
 
 
-def draw(found: Estimates, path: Path, truth_n: np.ndarray | None = None) -> None:
+def draw(found: Estimates, path: Path) -> None:
     """Draw shape, force, tensions and nodes that touch.
 
     Args:
         found: The estimates.
         path: File to write.
-        truth_n: True magnitudes of the force where they are known, ``(K,)`` [N].
 
     Raises:
         UserError: If the file cannot be written.
@@ -36,7 +35,7 @@ def draw(found: Estimates, path: Path, truth_n: np.ndarray | None = None) -> Non
     force = figure.add_subplot(grid[0, 1])
     others = [figure.add_subplot(grid[row, 1], sharex=force) for row in (1, 2)]
     times, label = time_axis(found)
-    _draw_force(force, times, found, truth_n)
+    _draw_force(force, times, found)
     _draw_tensions(others[0], times, found)
     _draw_contacts(others[1], times, found)
     others[1].set_xlabel(label)
@@ -69,13 +68,11 @@ def _draw_shapes(axis: Axes, found: Estimates) -> None:
     axis.set_title(f"shape at {label.split(' ')[0]} {times[pressed]:.6g}, and before", fontsize=10)
 
 
-def _draw_force(axis: Axes, times: np.ndarray, found: Estimates, truth_n: np.ndarray | None) -> None:
+def _draw_force(axis: Axes, times: np.ndarray, found: Estimates) -> None:
     force, deviation = found.force_n, found.force_std_n
     low, high = np.maximum(force - 2 * deviation, 0), force + 2 * deviation
     axis.fill_between(times, low, high, color=FORCE, alpha=0.25, lw=0, label="± 2 standard deviations")
     axis.plot(times, force, color=FORCE, label="estimated")
-    if truth_n is not None:
-        axis.plot(times, truth_n, color="k", lw=1, ls="--", label="true")
     axis.set(ylabel="contact force [N]", ylim=(0, None))
     axis.legend(loc="upper left", fontsize=8)
     axis.grid(alpha=0.3)

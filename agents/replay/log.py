@@ -52,8 +52,8 @@ class Log:
             raise ValueError(f"every is {count}; it must be at most {len(self.rows)}, the number of rows")
 
         def mean(values: np.ndarray) -> np.ndarray:
-            kept = values[: len(values) // count * count]
-            return np.asarray(kept.reshape(-1, count, *values.shape[1:]).mean(axis=1))
+            means = len(values) // count
+            return np.asarray(values[: means * count].reshape(means, count, *values.shape[1:]).mean(axis=1))
 
         time = None if self.time_s is None else mean(self.time_s)
         means = {name: mean(getattr(self, name)) for name in ("cables_mm", "tensions_n", "positions_mm")}
@@ -171,6 +171,6 @@ def _check_range(path: Path, rows: np.ndarray, names: list[str], cables: np.ndar
     low, high, noise = robot.least_cable_mm, robot.cable_limit_mm, ENCODER_NOISE * robot.offset_mm
     for row, column in np.argwhere((cables < low - noise) | (cables > high + noise)):
         raise UserError(
-            f"{path}, row {rows[row]}, column {names[column]}: {cables[row, column]:g} is out of range; it must be from "
-            f"{low:.6g} to {high:.6g} mm, the max_cable_mm of the robot"
+            f"{path}, row {rows[row]}, column {names[column]}: {cables[row, column]:g} is out of range; it must be "
+            f"from {low:.6g} to {high:.6g} mm, the max_cable_mm of the robot"
         )

@@ -36,8 +36,9 @@ def settings_of(robot: AnyRobot, instruments: Instruments, deviation: float | No
     noise = error = UNSEEN
     if deviation is not None:
         angle = deviation / robot.offset_mm / SEEN
-        noise, error = (min(angle * size, UNSEEN) for size in
-                        (instruments.position_noise_mm, instruments.position_error_mm))
+        noise, error = (
+            min(angle * size, UNSEEN) for size in (instruments.position_noise_mm, instruments.position_error_mm)
+        )
     latency = instruments.sensing.latency if deviation is not None else (0, 0)
     sensing = replace(instruments.sensing, angle_noise=(noise, noise), angle_error=(error, error), latency=latency)
     return _settings(robot, sensing=sensing, force_sensor=False)
@@ -63,8 +64,8 @@ def check_commands(commands_mm: np.ndarray, log: Log, robot: AnyRobot, name: str
     limit = _ranges(robot)["cable_limit_mm"]
     for row, command in np.argwhere(np.abs(commands_mm) > limit * (1 + 1e-9)):
         raise UserError(
-            f"{name}, row {log.rows[row]}: the cables bend a section by {commands_mm[row, command]:.4g} mm of cable; at "
-            f"most {limit:.4g} are allowed, max_cable_mm of the robot over its sections: raise max_cable_mm"
+            f"{name}, row {log.rows[row]}: the cables bend a section by {commands_mm[row, command]:.4g} mm of cable; "
+            f"at most {limit:.4g} are allowed, max_cable_mm of the robot over its sections: raise max_cable_mm"
         )
 
 
@@ -98,7 +99,9 @@ def _environment(settings: AnySettings) -> ContactEnv:
     """Return an environment of the nominal robot, without imperfections."""
     planar = isinstance(settings, Settings)
     kind, task = (PushObstacleEnv, PLANAR_TASK) if planar else (SpatialPushEnv, SPATIAL_TASK)
-    return kind(task=task, robot=settings.robot, obs_mode="dict", sensing=EXACT, force_sensor=False, **_ranges(settings.robot))
+    return kind(
+        task=task, robot=settings.robot, obs_mode="dict", sensing=EXACT, force_sensor=False, **_ranges(settings.robot)
+    )
 
 
 def _led(env: ContactEnv, now_mm: np.ndarray, wanted_mm: np.ndarray, most_mm: float) -> dict[str, np.ndarray]:

@@ -79,8 +79,8 @@ def _part(kind: type[Cable] | type[Load], value: object, what: str) -> Cable | L
 
 def robot_json(robot: AnyRobot) -> str:
     """Return the JSON of a robot, from which :func:`robot_of` makes an equal one."""
-    space = {"space": name for name, kind in KINDS.items() if kind is type(robot)}
-    return json.dumps({**space, **changed_fields(robot)}, indent=2)
+    space = "plane" if isinstance(robot, Robot) else "space"
+    return json.dumps({"space": space, **changed_fields(robot)}, indent=2)
 
 
 def changed_fields(instance: Any) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from agents.config import EstimateConfig
 from agents.errors import UserError
-from agents.replay.estimate import Estimates, estimate
+from agents.replay.estimate import Estimates, estimate_log
 from agents.replay.log import read_log
 from agents.replay.results import write_results
 from agents.replay.robots import read_robot
@@ -23,7 +23,7 @@ def run(config: EstimateConfig) -> Estimates:
     instruments = read_instruments(config.sensing, robot)
     log = read_log(config.log, robot)
     try:
-        found = estimate(log.averaged(config.every), robot, scene, instruments, str(config.log))
+        found = estimate_log(log.averaged(config.every), robot, scene, instruments, str(config.log))
     except ValueError as error:
         raise UserError(f"{config.log}: {error}") from error
     config.out.mkdir(parents=True, exist_ok=True)

@@ -38,9 +38,7 @@ def seen_shapes(log: Log, model: Model, commands_mm: np.ndarray, nominal: Sequen
     """
     if not log.nodes.size:
         return Seen(nominal, None)
-    found = [
-        _nearest(model, *row, log.nodes) for row in zip(nominal, commands_mm, log.positions_mm, strict=True)
-    ]
+    found = [_nearest(model, *row, log.nodes) for row in zip(nominal, commands_mm, log.positions_mm, strict=True)]
     shapes, deviations = zip(*found, strict=True)
     return Seen(shapes, float(np.percentile(deviations, TYPICAL)))
 

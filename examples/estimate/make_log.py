@@ -1,6 +1,6 @@
 """Write the log of a robot whose truth is known, by the realistic environment, for ``ccr-gym estimate``.
 
-The robot pulls its cable, lets it out once to tell friction from rigidity, pulls until it touches the obstacle, and then
+The robot pulls its cable, lets it out once to tell friction from rigidity, pulls until it touches the obstacle, then
 holds and changes its force. Run ``python examples/estimate/make_log.py`` after ``pip install '.[agents]'``.
 """
 
