@@ -49,7 +49,7 @@ def _settings(robot: AnyRobot, **others: Any) -> AnySettings:
     return kind(robot=robot, **_ranges(robot), **others)  # type: ignore[arg-type]
 
 
-def _ranges(robot: AnyRobot) -> dict[str, float]:
+def _ranges(robot: AnyRobot) -> dict[str, Any]:
     """Return the settings by which one step may command anything that the robot's cables can do."""
     limit = robot.cable_limit_mm / actuation_of(robot).sections
     return {"cable_limit_mm": limit, "max_increment_mm": limit}

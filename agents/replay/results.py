@@ -10,6 +10,7 @@ import numpy as np
 from agents.files import replacing, write_text
 from agents.replay.estimate import Estimates
 
+Column = Sequence[object] | np.ndarray
 AXES = "xyz"
 DIGITS = 6  # significant ones of what is written
 
@@ -26,9 +27,9 @@ def write_results(found: Estimates, out: Path) -> None:
     write_text(out / "estimate.json", json.dumps(summary(found), indent=2) + "\n")
 
 
-def result_columns(found: Estimates) -> dict[str, Sequence[object]]:
+def result_columns(found: Estimates) -> dict[str, Column]:
     """Return the columns of estimate.csv by name, each with an entry for each row of the log."""
-    columns: dict[str, Sequence[object]] = {"row": found.log.rows.tolist()}
+    columns: dict[str, Column] = {"row": found.log.rows.tolist()}
     if found.log.time_s is not None:
         columns["time_s"] = found.log.time_s
     columns |= {"force_n": found.force_n, "force_std_n": found.force_std_n}

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from agents.errors import UserError
 from agents.replay.json_files import check_names, check_object, read_json
@@ -88,7 +89,7 @@ def instruments_of(value: object, robot: AnyRobot) -> Instruments:
 
 def _range(name: str, value: object, most: float) -> tuple[float, float]:
     """Return a range, which may be given as one number."""
-    ends = value if isinstance(value, list) else [value, value]
+    ends: list[Any] = value if isinstance(value, list) else [value, value]
     numbers = [end for end in ends if type(end) in (int, float) and math.isfinite(end) and 0 <= end <= most]
     if not (len(numbers) == len(ends) == 2 and numbers[0] <= numbers[1]):
         raise ValueError(
