@@ -123,7 +123,9 @@ def table(setup: Setup) -> str:
     finer = replace(setup, robot=replace(setup.robot, segments=2 * setup.robot.segments))
     tension = setup.solve().tension
     more = [100 * (force(finer) / force(setup) - 1), 100 * (estimate(finer, tension) / estimate(setup, tension) - 1)]
-    rows.append(f"| n = {setup.robot.segments} → {finer.robot.segments} segments | | {more[0]:+.1f} % | {more[1]:+.1f} % |")
+    rows.append(
+        f"| n = {setup.robot.segments} → {finer.robot.segments} segments | | {more[0]:+.1f} % | {more[1]:+.1f} % |"
+    )
     return "\n".join([head, "| --- | --- | --- | --- |", *rows, *tension_rows(setup)])
 
 

@@ -49,7 +49,7 @@ def robot_of(value: object) -> AnyRobot:
         raise ValueError(f"space is {space!r}; it must be one of {', '.join(KINDS)}")
     kind = KINDS[space]
     check_names(given, [field.name for field in fields(kind)], f"{kind.__name__} (or space, or preset)")
-    values = {name: _decoded(name, entry) for name, entry in given.items()}
+    values: dict[str, Any] = {name: _decoded(name, entry) for name, entry in given.items()}
     if preset is not None:
         return kind.preset(preset, **values)
     for field in fields(kind):

@@ -31,8 +31,8 @@ def test_a_soft_segment_lowers_it():
 def tip_error(robot, mass_per_length, rate, prescribed):
     """Largest distance of the tip from the equilibrium over the length, for a cable rate [mm/s] and the worst stop."""
     turning = rate / robot.offset_mm * unit(robot, mass_per_length)
-    times = np.linspace(0, 12, 1500)
-    stops = np.linspace(0.1, 4, 40)
+    times = np.linspace(0, 12, 600)
+    stops = np.linspace(0.1, 4, 20)
     return turning * max(np.abs(beam.swing(prescribed, stop, times)).max() for stop in stops)
 
 
