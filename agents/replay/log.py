@@ -85,12 +85,14 @@ def read_log(path: Path, robot: AnyRobot) -> Log:
     cables = np.column_stack([columns[name] for name in displacements])
     _check_range(path, rows, displacements, cables, robot)
     cables = np.clip(cables, robot.least_cable_mm, robot.cable_limit_mm)
+    tensions_n = np.column_stack([columns[name] for name in tensions])
+    _check_signs(path, tensions_n, cables)
     places = [[columns[name] for name in group] for group in positions]
     return Log(
         rows=rows,
         time_s=time,
         cables_mm=cables,
-        tensions_n=np.column_stack([columns[name] for name in tensions]),
+        tensions_n=tensions_n,
         nodes=np.array(nodes, int),
         positions_mm=np.array(places).reshape(len(nodes), len(axes), len(rows)).transpose(2, 0, 1),
     )
@@ -165,6 +167,16 @@ def _check_times(path: Path, rows: np.ndarray, time: np.ndarray) -> None:
     for row, before, now in zip(rows[1:], time, time[1:], strict=False):
         if not now > before:
             raise UserError(f"{path}, row {row}, column time_s: {now:g} must be above {before:g}, the row before")
+
+
+def _check_signs(path: Path, tensions_n: np.ndarray, cables: np.ndarray) -> None:
+    """Check that cables that are pulled are under tension, and not under compression, on average."""
+    pulled = tensions_n[cables > 0]
+    if pulled.size and pulled.mean() < -np.abs(pulled - pulled.mean()).mean():
+        raise UserError(
+            f"{path}: tensions of pulled cables are {pulled.mean():.3g} N on average; they must be positive where a cable "
+            "pulls: turn their sign, or that of the displacements"
+        )
 
 
 def _check_range(path: Path, rows: np.ndarray, names: list[str], cables: np.ndarray, robot: AnyRobot) -> None:

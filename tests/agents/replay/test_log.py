@@ -70,6 +70,12 @@ def test_what_is_wrong_is_one_line(text, message, path):
     assert "\n" not in str(caught.value)
 
 
+def test_a_wrong_sign_is_noticed(path):
+    with pytest.raises(UserError, match=r"tensions of pulled cables are -2\.5 N on average"):
+        read(path, "cable_mm,tension_n\n1,-2\n2,-3\n")
+    read(path, "cable_mm,tension_n\n1,-0.02\n2,0.01\n")  # noise
+
+
 def test_bytes_that_are_no_text(path):
     path.write_bytes(b"cable_mm,tension_n\n\xff\xfe,1\n")
     with pytest.raises(UserError, match="not a text in UTF-8"):
