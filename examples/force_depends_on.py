@@ -9,6 +9,7 @@ import numpy as np
 
 from solver import Circle, Robot, Scene, Solver, contact_estimate, sensitivity
 
+ROBOT, CIRCLE = Robot.prototype(), Circle(center=(49.0, 112.0), radius=14.0)
 CABLE_MM, STEPS = 8.0, 80
 STEP = 1e-4  # of a parameter, over its size, for central differences
 
@@ -17,8 +18,8 @@ STEP = 1e-4  # of a parameter, over its size, for central differences
 class Setup:
     """A robot that presses on a circle, and what its motor reads."""
 
-    robot: Robot = Robot.prototype()
-    circle: Circle = Circle(center=(49.0, 112.0), radius=14.0)
+    robot: Robot = ROBOT
+    circle: Circle = CIRCLE
     cable_mm: float = CABLE_MM
 
     def solve(self):

@@ -65,7 +65,8 @@ def _draw_shapes(axis: Axes, found: Estimates) -> None:
         axis.plot(*found.log.positions_mm[late].T, "x", color=MEASURED, label="measured")
         axis.legend(loc="lower right", fontsize=8)
     times, label = time_axis(found)
-    axis.set_title(f"shape at {label.split(' ')[0]} {times[pressed]:.6g}, and before", fontsize=10)
+    when = f"row {times[pressed]:.0f}" if label == "row" else f"{times[pressed]:.6g} s"
+    axis.set_title(f"shape at {when}, and before", fontsize=10)
 
 
 def _draw_force(axis: Axes, times: np.ndarray, found: Estimates) -> None:
@@ -92,7 +93,9 @@ def _draw_contacts(axis: Axes, times: np.ndarray, found: Estimates) -> None:
     for obstacle in range(found.obstacle_forces_n.shape[1]):
         touching = [np.argwhere(shape.contact[obstacle].any(axis=0))[:, 0] for shape in found.shapes]
         at = np.repeat(times, [len(nodes) for nodes in touching])
-        axis.plot(at, np.concatenate(touching), ".", ms=3, color=f"C{3 + obstacle}")
+        axis.plot(at, np.concatenate(touching), ".", ms=3, color=f"C{3 + obstacle}", label=f"obstacle {obstacle}")
+    if found.obstacle_forces_n.shape[1] > 1:
+        axis.legend(fontsize=7, ncols=4, loc="lower left")
     robot = found.shapes[0].robot
     axis.set(ylabel="node in contact", ylim=(0, robot.segments * (robot.between + 1) + 1))
     axis.grid(alpha=0.3)

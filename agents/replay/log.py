@@ -174,8 +174,8 @@ def _check_signs(path: Path, tensions_n: np.ndarray, cables: np.ndarray) -> None
     pulled = tensions_n[cables > 0]
     if pulled.size and pulled.mean() < -np.abs(pulled - pulled.mean()).mean():
         raise UserError(
-            f"{path}: tensions of pulled cables are {pulled.mean():.3g} N on average; they must be positive where a cable "
-            "pulls: turn their sign, or that of the displacements"
+            f"{path}: tensions of pulled cables are {pulled.mean():.3g} N on average; they must be positive where a "
+            "cable pulls: turn their sign, or that of the displacements"
         )
 
 
