@@ -28,6 +28,13 @@ if TYPE_CHECKING:
     from agents.policy import Observation as Observation
     from agents.policy import Policy as Policy
     from agents.policy import search as search
+    from agents.replay.estimate import estimate_log as estimate_log
+    from agents.replay.log import read_log as read_log
+    from agents.replay.robots import read_robot as read_robot
+    from agents.replay.robots import robot_json as robot_json
+    from agents.replay.scenes import read_scene as read_scene
+    from agents.replay.scenes import scene_json as scene_json
+    from agents.replay.sensing import read_instruments as read_instruments
 
 PART_OF = "ccr-gym"  # tells this package from others of its name
 _MODULES = {
@@ -45,10 +52,17 @@ _MODULES = {
     "RobotEstimator": "estimation.robot",
     "SB3VecEnv": "learning.sb3_adapter",
     "differentiable": "learning.differentiable",
+    "estimate_log": "replay.estimate",
     "measure": "benchmark.evaluate",
+    "read_instruments": "replay.sensing",
+    "read_log": "replay.log",
+    "read_robot": "replay.robots",
+    "read_scene": "replay.scenes",
     "reproduce": "paper.reproduce",
+    "robot_json": "replay.robots",
     "run_episode": "benchmark.evaluate",
     "run_episodes": "benchmark.evaluate",
+    "scene_json": "replay.scenes",
     "scores": "benchmark.evaluate",
     "search": "policy",
     "trained": "learning.pretrained",

@@ -7,6 +7,7 @@ import tyro
 
 from agents.config import (
     BenchConfig,
+    EstimateConfig,
     EvaluateConfig,
     ReproduceConfig,
     RetrainConfig,
@@ -21,6 +22,7 @@ Command = (
     | Annotated[SweepConfig, tyro.conf.subcommand("sweep")]
     | Annotated[BenchConfig, tyro.conf.subcommand("bench")]
     | Annotated[ReproduceConfig, tyro.conf.subcommand("reproduce")]
+    | Annotated[EstimateConfig, tyro.conf.subcommand("estimate")]
 )
 
 
@@ -39,6 +41,8 @@ def run() -> None:
             bench(config)
         case ReproduceConfig() as config:
             reproduce(config)
+        case EstimateConfig() as config:
+            estimate(config)
 
 
 def parse(arguments: Sequence[str] | None = None) -> Command:
@@ -107,3 +111,18 @@ def reproduce(config: ReproduceConfig) -> None:
 
     reproduce.reproduce(config.out)
     print(f"Written: {config.out}/paper.md, with its figures, and {config.out}/paper.json")
+
+
+def estimate(config: EstimateConfig) -> None:
+    """Estimate shape, contacts and contact force from the log of a real robot."""
+    from agents.replay.run import run
+
+    found = run(config)
+    known, scales, largest = found.known[-1], found.scales, int(found.force_n.argmax())
+    print(f"Rigidity: {known.rigidity:.3g} ± {known.rigidity_std:.2g} times that of {config.robot}")
+    print(f"Loss of tension to friction: {known.loss:.3f} ± {known.loss_std:.2g}")
+    backlash, deviation = (2 * scales.travel_mm * value for value in (known.half_backlash, known.half_backlash_std))
+    print(f"Play between motor and cable: {backlash:.3g} ± {deviation:.2g} mm")
+    row, force, spread = found.log.rows[largest], found.force_n[largest], found.force_std_n[largest]
+    print(f"Largest contact force: {force:.3g} ± {spread:.2g} N, in row {row}")
+    print(f"Written: {config.out}/estimate.csv, shape.csv, estimate.json and estimate.png")

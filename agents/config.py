@@ -219,6 +219,27 @@ class ReproduceConfig:
     """Folder for paper.md, its figures table_1.png and paper.png, and paper.json."""
 
 
+@dataclass(frozen=True, slots=True)
+class EstimateConfig:
+    """Estimate shape, contacts and contact force from the log of a real robot."""
+
+    log: tyro.conf.Positional[Path]
+    """CSV file with a row for each instant: displacements and tensions of the cables, and positions if measured."""
+    robot: Path
+    """JSON file of the robot: its fields, or a preset with the fields that differ."""
+    scene: Path
+    """JSON file of the obstacles: a list."""
+    out: Path = Path("runs/estimate")
+    """Folder for estimate.csv, shape.csv, estimate.json and estimate.png."""
+    sensing: Path | None = None
+    """JSON file of what is known of play, friction and noise; by default the ranges of realistic sensing."""
+    every: int = 1
+    """Rows of the log that are averaged to one."""
+
+    def __post_init__(self) -> None:
+        _check_counts(self, "every")
+
+
 def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise ValueError(f"{field} is {value!r}; it must be one of {', '.join(choices)}")

@@ -26,7 +26,8 @@ from solver.spatial import SpatialEquilibrium
 
 Info = dict[str, Any]  # Gymnasium's own type of infos and options
 RENDER_MODES = ["human", "rgb_array"]
-METADATA: Info = {"render_modes": RENDER_MODES, "render_fps": 20}
+DT_S = 0.05  # time that a step stands for; equilibria know none, so any other is as good where it is slow enough
+METADATA: Info = {"render_modes": RENDER_MODES, "render_fps": round(1 / DT_S), "dt": DT_S}
 SCALARS: dict[type, Callable[[Any], Any]] = {float: np.float64, int: np.int64, bool: bool}
 SPACES = {2: "the plane", 3: "space"}
 

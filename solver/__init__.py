@@ -5,6 +5,7 @@ from solver.common.actuation import Actuation
 from solver.common.equilibrium import Optimality, Residuals
 from solver.common.obstacle import Extent, Obstacle
 from solver.common.presets import PRESETS, Preset
+from solver.common.quasi_static import natural_frequency, quasi_static_rate
 from solver.common.rod import Cable, Load
 from solver.common.rows import Rows
 from solver.common.scene import Scene
@@ -74,8 +75,10 @@ __all__ = [
     "free_motion",
     "free_nodes",
     "free_tension",
+    "natural_frequency",
     "onset_tension",
     "point_forces",
+    "quasi_static_rate",
     "sensitivity",
     "shape_estimate",
     "shape_motion",

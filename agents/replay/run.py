@@ -1,0 +1,32 @@
+"""The command ``ccr-gym estimate``: from the files of a robot to results."""
+
+from agents.config import EstimateConfig
+from agents.errors import UserError
+from agents.replay.estimate import Estimates, estimate_log
+from agents.replay.log import read_log
+from agents.replay.results import write_results
+from agents.replay.robots import read_robot
+from agents.replay.scenes import read_scene
+from agents.replay.sensing import read_instruments
+
+
+def run(config: EstimateConfig) -> Estimates:
+    """Replay a log, write the results to a folder, and return them.
+
+    Raises:
+        UserError: If a file is not as documented, or cannot be written.
+    """
+    from agents.replay.figure import draw
+
+    robot = read_robot(config.robot)
+    scene = read_scene(config.scene, robot)
+    instruments = read_instruments(config.sensing, robot)
+    log = read_log(config.log, robot)
+    try:
+        found = estimate_log(log.averaged(config.every), robot, scene, instruments, str(config.log))
+    except ValueError as error:
+        raise UserError(f"{config.log}: {error}") from error
+    config.out.mkdir(parents=True, exist_ok=True)
+    write_results(found, config.out)
+    draw(found, config.out / "estimate.png")
+    return found
