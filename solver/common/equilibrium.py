@@ -229,7 +229,8 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
         """Recompute the optimality conditions of the node-coordinate problem from the shape and multipliers alone.
 
         The derivatives are those of the node-coordinate problem, which shares nothing with the solver's reduced
-        coordinates.
+        coordinates. It has no gaps at the clamped base: where that holds up an obstacle on a spring, the stationarity
+        of the obstacle lacks the base's force.
         """
         derivatives = self._derivatives(*self._node_point())
         _, lengths, _, gaps, _ = derivatives
