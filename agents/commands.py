@@ -8,11 +8,13 @@ import tyro
 from agents.config import (
     BenchConfig,
     EvaluateConfig,
+    PlayConfig,
     ReproduceConfig,
     RetrainConfig,
     SweepConfig,
     TrainConfig,
 )
+from agents.errors import UserError
 
 Command = (
     Annotated[TrainConfig, tyro.conf.subcommand("train")]
@@ -21,6 +23,7 @@ Command = (
     | Annotated[SweepConfig, tyro.conf.subcommand("sweep")]
     | Annotated[BenchConfig, tyro.conf.subcommand("bench")]
     | Annotated[ReproduceConfig, tyro.conf.subcommand("reproduce")]
+    | Annotated[PlayConfig, tyro.conf.subcommand("play")]
 )
 
 
@@ -39,6 +42,8 @@ def run() -> None:
             bench(config)
         case ReproduceConfig() as config:
             reproduce(config)
+        case PlayConfig() as config:
+            play(config)
 
 
 def parse(arguments: Sequence[str] | None = None) -> Command:
@@ -107,3 +112,14 @@ def reproduce(config: ReproduceConfig) -> None:
 
     reproduce.reproduce(config.out)
     print(f"Written: {config.out}/paper.md, with its figures, and {config.out}/paper.json")
+
+
+def play(config: PlayConfig) -> None:
+    """Serve a page to play with a robot in the browser."""
+    try:
+        import viser  # noqa: F401 - looked for before anything slow is imported
+    except ModuleNotFoundError as error:
+        raise UserError('play needs its extra: pip install "ccr-gym[play]"') from error
+    from agents.play import serve
+
+    serve.play(config)
