@@ -122,7 +122,9 @@ class Page:
         self._on(self._episodes, lambda value: setattr(session, "episodes", value))
         self._gif = gui.add_button("Record a GIF")
         self._gif.on_click(lambda _: self._inputs.put(self._toggle_recording))
-        gui.add_markdown("Drag obstacles by their handles. Keys: " + "; ".join(_key_hints(session.env.action_spec.size)))
+        gui.add_markdown(
+            "Drag obstacles by their handles. Keys: " + "; ".join(_key_hints(session.env.action_spec.size))
+        )
 
     def _add_sliders(self) -> None:
         session, spec = self._session, self._session.env.action_spec
@@ -139,6 +141,7 @@ class Page:
 
     def _slider(self, label: str, low: float, high: float, value: float) -> viser.GuiSliderHandle[float]:
         step = 10.0 ** np.floor(np.log10((high - low) / 100))
+        low, high = (float(np.round(bound / step) * step) for bound in (low, high))
         return self._server.gui.add_slider(label, low, high, float(step), float(np.clip(value, low, high)))
 
     def _on(self, handle: Any, act: Callable[[Any], None]) -> None:

@@ -265,5 +265,3 @@ class Session:
             actuated_mm=tuple(self.env.privileged_state.actuated_mm.tolist()),
             message=self._message if self._ticks < self._shown_until else "",
         )
-
-
