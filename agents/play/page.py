@@ -19,7 +19,7 @@ from agents.play.world import World
 from ccr_gym import ENV_IDS
 from solver import PRESETS
 
-SLOW = 5  # ticks between updates of plots and sliders, which a browser draws slowly
+SLOW = 8  # ticks between updates of plots and sliders, which a browser draws slowly
 NUDGE = 4.0  # full actions of a key
 KEYS = (("K", "J"), ("L", "H"), ("O", "U"), ("P", "Y"))  # that pull and pay out each actuated coordinate
 GOOD, BAD = "#008c7e", "#d01842"

@@ -14,6 +14,7 @@ from agents.play.session import Session
 
 HOST = "127.0.0.1"
 RATE = 40.0  # updates a second
+LATEST = 0.2  # that updates may be late by and are caught up with [s]
 
 
 def play(config: PlayConfig) -> None:
@@ -44,9 +45,9 @@ def play(config: PlayConfig) -> None:
 
 
 def run(page: Page) -> None:
-    """Update the page at its rate, for ever; after a slow update it does not hurry to catch up."""
+    """Update the page at its rate, for ever; after a slow update it catches up what it is late by, up to a bound."""
     due = time.perf_counter()
     while True:
         page.tick()
-        due = max(due + 1 / RATE, time.perf_counter())
+        due = max(due + 1 / RATE, time.perf_counter() - LATEST)
         time.sleep(max(0.0, due - time.perf_counter()))

@@ -92,7 +92,7 @@ class World:
     def _add_robot(self, frame: Frame, radius: float) -> None:
         shape = frame.shape
         self._backbone = self._scene.add_spline_catmull_rom(
-            "/robot/backbone", shape.nodes, thickness=THICK, color=BACKBONE, segments=3 * len(shape.nodes)
+            "/robot/backbone", shape.nodes, thickness=THICK, color=BACKBONE, segments=2 * len(shape.nodes)
         )
         self._cables = self._scene.add_line_segments("/robot/cables", shape.cables, CABLE, thickness=THIN)
         mesh = disk(radius, min(0.012, 0.25 / len(shape.nodes)))
