@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test coverage lint docs native sanitize address thread bench instructions soak clients clean
+.PHONY: demo test coverage lint docs native sanitize address thread bench instructions soak browser clients clean
 
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
@@ -62,6 +62,10 @@ instructions: $(INSTALL)  ## count instructions of the kernel (needs valgrind)
 soak: $(INSTALL)
 	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
 	$(BIN)/python -m pytest -k fuzz --hypothesis-profile=default
+
+browser: $(INSTALL)  ## ccr-gym play in a real browser (needs chromium: apt-get install chromium)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt playwright
+	$(BIN)/python -m pytest tests/browser -s
 
 $(INSTALL): pyproject.toml constraints.txt $(KERNEL_SOURCES)
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)

@@ -9,11 +9,13 @@ from agents.config import (
     BenchConfig,
     EstimateConfig,
     EvaluateConfig,
+    PlayConfig,
     ReproduceConfig,
     RetrainConfig,
     SweepConfig,
     TrainConfig,
 )
+from agents.errors import UserError
 
 Command = (
     Annotated[TrainConfig, tyro.conf.subcommand("train")]
@@ -23,6 +25,7 @@ Command = (
     | Annotated[BenchConfig, tyro.conf.subcommand("bench")]
     | Annotated[ReproduceConfig, tyro.conf.subcommand("reproduce")]
     | Annotated[EstimateConfig, tyro.conf.subcommand("estimate")]
+    | Annotated[PlayConfig, tyro.conf.subcommand("play")]
 )
 
 
@@ -43,6 +46,8 @@ def run() -> None:
             reproduce(config)
         case EstimateConfig() as config:
             estimate(config)
+        case PlayConfig() as config:
+            play(config)
 
 
 def parse(arguments: Sequence[str] | None = None) -> Command:
@@ -126,3 +131,14 @@ def estimate(config: EstimateConfig) -> None:
     row, force, spread = found.log.rows[largest], found.force_n[largest], found.force_std_n[largest]
     print(f"Largest contact force: {force:.3g} ± {spread:.2g} N, in row {row}")
     print(f"Written: {config.out}/estimate.csv, shape.csv, estimate.json and estimate.png")
+
+
+def play(config: PlayConfig) -> None:
+    """Serve a page to play with a robot in the browser."""
+    try:
+        import viser  # noqa: F401 - looked for before anything slow is imported
+    except ModuleNotFoundError as error:
+        raise UserError('play needs its extra: pip install "ccr-gym[play]"') from error
+    from agents.play import serve
+
+    serve.play(config)

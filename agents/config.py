@@ -12,6 +12,7 @@ from agents.errors import UserError
 from agents.files import write_text
 from agents.tuned import LEARNERS, DistilledSettings, LearnerSettings, PPOSettings, RecurrentPPOSettings, SACSettings
 from ccr_gym import ENV_IDS
+from solver import PRESETS
 
 VALIDATION_SEED = 900_000  # training seeds lie below; learning curves use the seeds from here on
 VALIDATION_EPISODES = 64
@@ -238,6 +239,28 @@ class EstimateConfig:
 
     def __post_init__(self) -> None:
         _check_counts(self, "every")
+
+
+@dataclass(frozen=True, slots=True)
+class PlayConfig:
+    """Play with a robot in the browser: pull cables, drag obstacles, watch forces, let policies drive."""
+
+    robot: str = "prototype"
+    """Robot to begin with, a name of `solver.PRESETS`."""
+    env_id: str = "CCR/PushObstacle-v1"
+    """Environment to begin with."""
+    port: int = 8080
+    """Port of the page on this machine; the next free one if it is taken."""
+    open: bool = True
+    """Open the page in the browser."""
+    out: Path = Path("runs/play")
+    """Folder for recorded GIFs."""
+
+    def __post_init__(self) -> None:
+        _check_choice("robot", self.robot, tuple(PRESETS))
+        _check_choice("env_id", self.env_id, tuple(ENV_IDS))
+        if type(self.port) is not int or not 0 < self.port < 65536:
+            raise ValueError(f"port is {self.port!r}; it must be from 1 to 65535")
 
 
 def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:

@@ -21,7 +21,7 @@ from ccr_gym.scales import Scales
 from ccr_gym.settings import AnySettings
 from ccr_gym.state import EnvState, check_state, restored, state_of
 from ccr_gym.task import AnyTask, Assignment, check_force, check_task
-from solver import Equilibrium, Scene
+from solver import Equilibrium, Obstacle, Scene
 from solver.spatial import SpatialEquilibrium
 
 Info = dict[str, Any]  # Gymnasium's own type of infos and options
@@ -200,6 +200,33 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         """
         self._check_started("privileged_state")
         return self._episodes.privileged_state(0)
+
+    def move_obstacles(self, scene: Scene | Sequence[Obstacle]) -> Scene:
+        """Move and resize the obstacles while the motors stay, and return where they stand then.
+
+        They stop where the robot can give way no further; the status of :attr:`equilibrium` tells. No step passes.
+
+        Args:
+            scene: Where to: the present obstacles (``equilibrium.scene``), shifted and with other sizes or not.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+            ValueError: If they are other obstacles, turned or too small; nothing has changed then.
+        """
+        self._check_started("move_obstacles")
+        return self._episodes.move_obstacles(0, scene if isinstance(scene, Scene) else Scene(scene))
+
+    def set_desired_force(self, force_n: float) -> None:
+        """Set the magnitude of the set-point, the largest one where it changes with time [N].
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+            ValueError: If it is not positive, or too large for the robot.
+        """
+        self._check_started("set_desired_force")
+        force = float(check_array("force_n", force_n, ()))
+        check_force("force_n", force, self.settings.scales.force_n)
+        self._episodes.set_desired_force(0, force)
 
     def probe(self, actuated_mm: np.ndarray) -> np.ndarray:
         """Return the contact force, ``(d,)`` [N], at other actuated coordinates ``(actions,)`` [mm]; nothing moves.

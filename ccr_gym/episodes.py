@@ -14,6 +14,7 @@ from ccr_gym.reward import SUCCESS_ERROR, TERMS, reward_terms
 from ccr_gym.scales import AHEAD
 from ccr_gym.task import PROFILE_STEPS
 from ccr_gym.transition import ALL, Transition
+from solver import Scene
 from solver.common.batch import BaseBatch
 from solver.common.operations import dot
 
@@ -163,6 +164,39 @@ class EpisodeBatch(Transition):
         )
         motor, half_backlash = sensors.motor_mm(index).copy(), sensors.half_backlash_mm(index)
         return PrivilegedState(force, ratio, goal, actuated, motor, half_backlash, loss, delay)
+
+    def move_obstacles(self, robot: int, scene: Scene) -> Scene:
+        """Move the obstacles of a robot whose motors stay, as far as it lets them; return where they stand then.
+
+        Raises:
+            ValueError: If the obstacles cannot move there within a step; nothing has changed then.
+        """
+        batch, adapter = self.batch, self.adapter
+        adapter.write_command(batch.commands, self._actuated_mm[robot], robot)
+        batch.move(robot, [scene])
+        blocks, now = batch.blocks[robot], batch.scene(robot)
+        self._actuated_mm[robot] = adapter.actuated_mm(blocks, self._actuated_mm[robot])
+        if self._sensors is not None:
+            self.model.move(robot, [now])
+        if adapter.obstacle_size:
+            self._obstacle_features[robot] = adapter.obstacle_features(now)
+        back_mm = -self._motion_mm(robot)
+        self._starts[robot] = Scene(obstacle.shifted(back_mm.tolist()) for obstacle in now)
+        self._sense(robot)
+        self._estimate(robot)
+        return now
+
+    def _motion_mm(self, robot: int) -> np.ndarray:
+        """Return how far the task has moved the obstacles of a robot since the start, ``(d,)`` [mm]."""
+        if self._motions_mm is None:
+            return np.zeros(self.adapter.space)
+        return np.asarray(self._motions_mm[robot, min(int(self._time[robot]), PROFILE_STEPS - 1)])
+
+    def set_desired_force(self, robot: int, force_n: float) -> None:
+        """Set the magnitude of a robot's set-point, the largest one where it moves; a vector keeps its direction."""
+        if self._vector:
+            self._goal_n[robot] *= force_n / norm(self._goal_n[robot])
+        self._desired_n[robot] = force_n
 
     def obstacles_moved_mm(self, index: int | slice) -> np.ndarray:
         """Return how far the first obstacle has moved since the start, ``(..., d)`` [mm]."""

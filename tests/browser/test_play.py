@@ -1,0 +1,166 @@
+"""``ccr-gym play`` in a real browser: Debian's Chromium, driven by Playwright; run by ``make browser``.
+
+It says how many updates a second reach the page while a policy drives, beside the frame rate of an empty page in the
+same run: without a GPU, and on a busy machine, a browser draws either slowly.
+"""
+
+import io
+import os
+import queue
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import imageio.v2 as imageio
+import numpy as np
+import psutil
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api")
+CHROMIUM = os.environ.get("CHROMIUM", shutil.which("chromium") or "")
+pytestmark = pytest.mark.skipif(not CHROMIUM, reason="needs chromium: apt-get install chromium")
+
+SHOTS = Path("build/browser")
+PATIENCE_MS = 180_000
+UPDATES = 30.0  # asked of the page, less in proportion where even an empty page is not drawn FULL times a second
+FULL = 60.0
+COUNT_FRAMES = """() => new Promise(done => {
+  let count = 0; const start = performance.now();
+  const frame = () => { count++; const time = performance.now() - start;
+    time > 5000 ? done(1000 * count / time) : requestAnimationFrame(frame) };
+  requestAnimationFrame(frame) })"""
+COUNT_UPDATES = """() => new Promise(done => {
+  const seen = new Set(), start = performance.now();
+  const look = () => { seen.add(document.querySelector('#ccr-status').dataset.tick);
+    const time = performance.now() - start;
+    time > 8000 ? done(1000 * seen.size / time) : setTimeout(look, 4) };
+  look() })"""
+
+
+@pytest.fixture(scope="module")
+def url():
+    command = [sys.executable, "-m", "agents.cli", "play", "--no-open", "--port", "8471"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    lines: queue.Queue[str] = queue.Queue()
+    reader = threading.Thread(target=lambda: [lines.put(line) for line in server.stdout], daemon=True)
+    reader.start()
+    while "Playing" not in (line := lines.get(timeout=120)):
+        pass
+    yield line.split(" at ")[1].split(";")[0]
+    server.send_signal(2)
+    assert server.wait(60) == 0
+    reader.join()
+    server.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as driver:
+        arguments = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def page(browser, url):
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.set_default_timeout(PATIENCE_MS)
+    page.errors, page.outside = [], []
+    page.on("console", lambda message: page.errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    local = url, "data:", "blob:"
+    page.on("request", lambda request: None if request.url.startswith(local) else page.outside.append(request.url))
+    page.goto(f"{url}/?fixedDpr=0.5")
+    page.wait_for_selector("#ccr-status", state="attached")
+    page.wait_for_timeout(3000)
+    return page
+
+
+def status(page, name):
+    return float(page.evaluate(f"document.querySelector('#ccr-status').dataset.{name}"))
+
+
+def force(page):
+    return float(page.evaluate("document.querySelector('#ccr-true').textContent"))
+
+
+def shoot(page, name):
+    SHOTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=SHOTS / name, timeout=PATIENCE_MS)
+
+
+def drag(page, start, end):
+    """Drags with the mouse, slowly enough for a page that is drawn without a GPU."""
+    page.mouse.move(*start)
+    page.wait_for_timeout(1500)
+    page.mouse.down()
+    for part in range(1, 11):
+        page.mouse.move(*(a + part / 10 * (b - a) for a, b in zip(start, end, strict=True)))
+        page.wait_for_timeout(300)
+    page.mouse.up()
+
+
+def test_an_obstacle_dragged_into_the_robot_is_felt(page):
+    assert force(page) == 0
+    assert status(page, "contacts") == 0
+    dismiss = page.query_selector(".mantine-Notification-closeButton")
+    if dismiss:
+        dismiss.click()
+    x, y = handle(page)
+    drag(page, (x, y), (x - 230, y))
+    deadline = time.time() + 60
+    while force(page) == 0 and time.time() < deadline:
+        page.wait_for_timeout(300)
+    shoot(page, "dragged.png")
+    assert force(page) > 0
+    assert status(page, "contacts") > 0
+
+
+def handle(page):
+    """Finds the arrow along x of the obstacle's handle by its colour, at the arrow's tip."""
+    picture = imageio.imread(io.BytesIO(page.screenshot(timeout=PATIENCE_MS)))[..., :3].astype(int)
+    red = (picture[..., 0] > 200) & (picture[..., 1] < 90) & (picture[..., 2] < 140)
+    red[:, :310], red[:, 950:] = False, False  # panels
+    ys, xs = np.nonzero(red)
+    assert len(xs), "the handle of the obstacle is not to be seen"
+    return float(xs.max() - 8), float(np.median(ys))
+
+
+def cpu_seconds():
+    """CPU time of the server and of all processes of the browser [s]."""
+    server, browser = 0.0, 0.0
+    for process in psutil.Process().children(recursive=True):
+        times = process.cpu_times()
+        if "agents.cli" in process.cmdline():
+            server += times.user + times.system
+        elif "chrom" in process.name():
+            browser += times.user + times.system
+    return server, browser
+
+
+def test_updates_a_second_with_a_policy(page, browser, url, capsys):
+    page.keyboard.press("n")
+    page.get_by_label("Driver").first.click()
+    page.get_by_role("option", name="MPC").click()
+    page.wait_for_timeout(3000)
+    before, first = cpu_seconds(), status(page, "tick")
+    updates = page.evaluate(COUNT_UPDATES)
+    used = [1e3 * (b - a) / (status(page, "tick") - first) for a, b in zip(before, cpu_seconds(), strict=True)]
+    shoot(page, "policy.png")
+    empty = browser.new_page(viewport={"width": 1280, "height": 800})
+    empty.goto("about:blank")
+    frames = empty.evaluate(COUNT_FRAMES)
+    empty.close()
+    with capsys.disabled():
+        print(f"\n{updates:.1f} updates/s with MPC driving; an empty page is drawn {frames:.1f} times a second")
+        print(f"CPU per update: {used[0]:.1f} ms in the server, {used[1]:.1f} ms in the browser, without a GPU")
+    assert updates >= UPDATES * min(1.0, frames / FULL)
+
+
+def test_no_error_and_nothing_from_elsewhere(page):
+    assert page.errors == []
+    assert page.outside == []
