@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test coverage lint native sanitize address thread bench instructions soak clients clean
+.PHONY: demo test coverage lint native sanitize address thread bench instructions soak clients readme clean
 
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
@@ -59,6 +59,9 @@ instructions: $(INSTALL)  ## count instructions of the kernel (needs valgrind)
 soak: $(INSTALL)
 	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
 	$(BIN)/python -m pytest -k fuzz --hypothesis-profile=default
+
+readme:  ## the README as printed, on a fresh clone of the last commit; README="--fast" or "--hours" for less or more of it
+	$(PYTHON) tests/fresh_readme.py $(README)
 
 $(INSTALL): pyproject.toml constraints.txt $(KERNEL_SOURCES)
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
