@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test coverage lint docs native sanitize address thread bench instructions soak browser clients clean
+.PHONY: demo test coverage lint docs native sanitize address thread bench instructions soak browser clients readme clean
 
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
@@ -66,6 +66,9 @@ soak: $(INSTALL)
 browser: $(INSTALL)  ## ccr-gym play in a real browser (needs chromium: apt-get install chromium)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt playwright
 	$(BIN)/python -m pytest tests/browser -s
+
+readme:  ## the README as printed, on a fresh clone of the last commit; README="--fast" or "--hours" for less or more of it
+	$(PYTHON) tests/fresh_readme.py $(README)
 
 $(INSTALL): pyproject.toml constraints.txt $(KERNEL_SOURCES)
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium
+import imageio.v3 as imageio
 import numpy as np
 import pytest
 from stable_baselines3 import PPO
@@ -13,6 +15,71 @@ from agents.tuned import PPO_IDEAL
 from ccr_gym import ENV_IDS
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
+SHORT = ("own_obstacle", "own_task", "plane", "render_gif", "sb3", "shooting", "space", "vector_ppo")
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_a_short_example_fits_a_screen(name):
+    assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) < 60
+
+
+def printed(name, capsys, *args):
+    runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](*args)
+    return capsys.readouterr().out
+
+
+def test_both_circles_press_the_robot_in_the_plane(capsys):
+    out = printed("plane", capsys)
+    assert re.search(r"circle 0 presses with 0\.\d+ N on nodes \[10\]", out)
+    assert re.search(r"circle 1 presses with 0\.\d+ N on nodes \[16\]", out)  # nodes of the paper's Fig. 5
+
+
+def test_sphere_and_cylinder_press_the_robot_in_space(capsys):
+    out = printed("space", capsys)
+    assert "Sphere presses" in out
+    assert "Cylinder presses" in out
+    assert out.count("CONVERGED") == 8
+
+
+def test_a_task_of_ones_own_is_solved_by_a_proportional_controller(capsys):
+    try:
+        out = printed("own_task", capsys)
+    finally:
+        gymnasium.registry.pop("Mine/PushTube-v1", None)
+    force, goal = re.search(r"step 64: (\S+) N of (\S+) N", out).groups()
+    assert force == goal
+    assert "64 guidewires" in out
+
+
+def test_an_obstacle_of_ones_own_is_pressed_in_the_solver_and_in_the_environment(capsys):
+    out = printed("own_obstacle", capsys)
+    force, goal = re.search(r"in the environment: (\S+) N of (\S+) N", out).groups()
+    assert float(force) == pytest.approx(float(goal), rel=1e-3)
+    gaps = [float(gap) for gap in re.findall(r"force 0\.[0-9]*[1-9][0-9]* N, smallest gap (\S+) mm", out)]
+    assert len(gaps) == 3
+    assert max(map(abs, gaps)) < 1e-9
+
+
+def test_planning_on_copies_reaches_the_set_point(capsys):
+    *_, force, _, _, goal = printed("shooting", capsys).split()
+    assert float(force) == pytest.approx(float(goal), rel=0.05)
+
+
+def test_a_gif_is_written(tmp_path, capsys):
+    path = tmp_path / "episode.gif"
+    assert "4 pictures" in printed("render_gif", capsys, path, 6)
+    assert imageio.imread(path).shape == (4, 640, 640, 3)
+
+
+def test_stable_baselines_trains_and_is_evaluated(capsys):
+    main = runpy.run_path(str(EXAMPLES / "sb3.py"))["main"]
+    assert all(0 < error <= 1 for error in main(2048))
+
+
+def test_ppo_on_the_vector_environment_learns(capsys):
+    main = runpy.run_path(str(EXAMPLES / "vector_ppo.py"))["main"]
+    before, after = main(updates=6)
+    assert after < 0.6 < before
 
 
 def test_ppo_trains_and_prints_its_error():
