@@ -11,6 +11,7 @@ DRIFT = 0.2  # change of the error of virtual work over the change of the force,
 LEAST_DRIFT = 0.01  # of such a change, over the force
 LEAST_NOISE = 1e-3  # of the sensor, where it has none [EI/L²]
 EXPECTED = 6.0  # readings that the expected noise of the sensor is worth
+SATURATED = 1 - 1e-6  # of the largest reading
 CORRECTED = 0.05  # standard deviation of a corrected force, over the force: a late reading is of another place
 
 
@@ -68,7 +69,8 @@ class ForceFilter:
         past = self._past[index]
         then = past[np.arange(len(past)), np.rint(latency).astype(int)]
         self._note_zero(measured, ~touching & ~past.any(axis=1), index)
-        return self._correct(measured, force, variance, then, touching, index)
+        read = (np.abs(observation["force_measured"]) < SATURATED).all(axis=1)
+        return self._correct(measured, force, variance, then, touching, read, index)
 
     def _note_zero(self, measured: np.ndarray, free: np.ndarray, index: EnvIndex) -> None:
         readings = self._readings[index] + free
@@ -85,9 +87,10 @@ class ForceFilter:
         variance: np.ndarray,
         then: np.ndarray,
         touching: np.ndarray,
+        read: np.ndarray,
         index: EnvIndex,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corrected force and its standard deviation.
+        """Return the corrected force and its standard deviation; a sensor at its limit is not read.
 
         What the sensor differs from virtual work by is the error of either: that of its zero, which stays, and that of
         virtual work. The difference is followed, and shared out by their variances.
@@ -100,7 +103,7 @@ class ForceFilter:
         drift = (DRIFT * change) ** 2 + (LEAST_DRIFT * force) ** 2
         spread = np.minimum(self._spread[index] + drift, variance + zero)
         shift = np.where(np.isinf(self._spread[index]), 0.0, self._shift[index])
-        gain = np.where(touching & (then > 0), spread / (spread + noise), 0.0)
+        gain = np.where(touching & read & (then > 0), spread / (spread + noise), 0.0)
         shift, spread = shift + gain * (size - then - shift), (1 - gain) * spread
         self._shift[index], self._spread[index] = np.where(touching, shift, 0.0), np.where(touching, spread, np.inf)
         share = variance / (variance + zero)

@@ -7,8 +7,9 @@ import numpy as np
 
 from agents.environment import EnvIndex
 from agents.estimation.candidates import ALL, Candidates, Loops
-from agents.estimation.force import ForceFilter
-from agents.estimation.shape import observed_commands, observed_sizes
+from agents.estimation.force import SATURATED, ForceFilter
+from agents.estimation.lever import LEAST_LEVER, BentLevers
+from agents.estimation.shape import observed_commands, observed_ratios
 from agents.estimation.tension import TensionFilter
 from ccr_gym import EXACT, Settings, SpatialSettings
 
@@ -17,14 +18,11 @@ LEAST_SEEN = 1e-3  # of such a standard deviation, where there is no noise [a]
 PLAY_ERROR = 0.001  # standard deviation of a seen command that neither noise nor a constant error explain [a]
 RIGIDITY_ERROR = 0.01  # standard deviation of the nominal tension, over the tension
 LOSS_ERROR = 0.003  # likewise, of the share of friction
-LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
+AT_REST = 1e-6  # of a motor [a]
 SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
 SHARE_CHANGE = 0.5  # likewise, over its change in a step
-MODEL_ERROR = 0.1  # standard deviation of virtual work over the force: other points move than those of a free robot
-LARGE = 12.0  # force on the nominal robot, whose square the share is over that virtual work falls short [EI/L²]
-SHORT_ERROR = 0.5  # standard deviation of what it falls short by, over that
-LARGEST = 8.0  # such a force up to which this was measured [EI/L²]
-LEAST_RIGIDITY = 0.1  # rigidity ratio, below those that are sampled
+MODEL_ERROR = 0.02  # standard deviation of virtual work over the force
+LARGE = 8.0  # force on the nominal robot, from which on virtual work tells little [EI/L²]
 
 
 class Knowledge(NamedTuple):
@@ -77,6 +75,8 @@ class RobotEstimator:
         self._candidates = candidates
         limit = settings.robot.max_tension / settings.scales.tension_n
         self.loops = Loops(count, commands, candidates)
+        self._levers = BentLevers(settings)
+        self._slopes = np.zeros((count, commands))  # of the free tension over the motor
         self._tension = TensionFilter(count, commands, candidates, sensing, limit)
         self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]), settings.force_span)
         self._seen_std = max(SEEN * float(np.mean(sensing.angle_noise)), LEAST_SEEN)
@@ -91,7 +91,7 @@ class RobotEstimator:
         self.loops.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
-        for part in (self._errors, self._squares, self._seen, self._share):
+        for part in (self._errors, self._squares, self._seen, self._share, self._slopes):
             part[index] = 0.0
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> Knowledge:
@@ -102,16 +102,18 @@ class RobotEstimator:
         shape = self._update_shape(observation, index)
         places = self.loops.places[index, 0]
         tensions, free, levers = self._tensions(observation)
-        nominal = _carried(free, motors, places)
+        nominal = self._carried(free, motors, places, index)
         self._tension.update(tensions, nominal, self.loops, touching, index)
         weights, delays = _posteriors(shape, self._tension.log_likelihood[index])
         play = weights.sum(axis=2)
         force, variance = self._virtual_work(tensions, nominal, levers, weights, index)
         latency = _moments(self._candidates.latencies, delays)
-        force, variance, pressing = self._on_target(force, variance, observation, touching, index)
-        force, force_std = self._force.update(observation, force, variance, latency[0], pressing, index)
         rigidity = self._tension.rigidity[index], self._tension.variance[index]
         mean = (weights * rigidity[0]).sum(axis=(1, 2))
+        if "lever" in observation:
+            force, variance = self._bent(force, variance, mean, observation)
+        force, variance, pressing = self._on_target(force, variance, observation, touching, index)
+        force, force_std = self._force.update(observation, force, variance, latency[0], pressing, index)
         spread = (weights * (rigidity[1] + (rigidity[0] - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
         half = _moments(self._candidates.plays, play, PLAY_ERROR)
         loss = _moments(self._candidates.losses, weights.sum(axis=1), LOSS_ERROR)
@@ -128,7 +130,7 @@ class RobotEstimator:
 
     def _update_shape(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
         """Compare the seen shape with each candidate; return log-likelihoods ``(k, L, B)``."""
-        seen, (_, offset) = observed_commands(observation, self._settings), observed_sizes(observation, self._settings)
+        seen, (*_, offset) = observed_commands(observation, self._settings), observed_ratios(observation, self._settings)
         places = self.loops.places[index][:, self._candidates.latencies] / offset[:, None, None, None]
         errors = seen[:, None, :, None] - places  # in units of the robot's own offset, as noise is one of angles
         self._errors[index] += errors
@@ -146,33 +148,48 @@ class RobotEstimator:
         measured, free = (self._tension_span * observation[key].astype(float) for key in ("tension", "free_tension"))
         return self._actuation.forces(measured), free, observation["lever"].astype(float)
 
+    def _carried(self, free: np.ndarray, motors: np.ndarray, places: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return free tensions ``(k, c, B)`` where the cables are, from those at the motors; they are linear in both.
+
+        A motor at 0 leaves its cable where the play ends, and tells nothing of the slope there: that before is kept.
+        """
+        away = np.abs(motors) > AT_REST
+        slopes = np.where(away, free / np.where(away, motors, 1.0), self._slopes[index])
+        self._slopes[index] = slopes
+        return slopes[..., None] * places
+
     def _virtual_work(
         self, tensions: np.ndarray, nominal: np.ndarray, levers: np.ndarray, weights: np.ndarray, index: EnvIndex
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and variance of the force that virtual work tells, ``(k,)``."""
+        """Return mean and variance of the force that virtual work of the free robot tells, ``(k,)``."""
         filtered = self._tension
         factors, levers = filtered.factors(self.loops, index), levers[:, :, None, None]
         robot, doubt = filtered.robot_tensions(tensions, index)
         lacking = robot - filtered.rigidity[index][:, None] * nominal[..., None]
         size = np.maximum((levers**2).sum(axis=1), LEAST_LEVER**2)
         forces = np.maximum((levers * lacking).sum(axis=1) / size, 0.0)
-        short = forces * self._shortfall(forces, filtered.rigidity[index])
-        forces = forces + short
         inner = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2
         inner = inner + (levers**2 * doubt).sum(axis=1)
         inner = inner + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
         mean = (weights * forces).sum(axis=(1, 2))
         spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
-        model = (MODEL_ERROR * mean) ** 2 + (SHORT_ERROR * (weights * short).sum(axis=(1, 2))) ** 2
-        return mean, (weights * spread).sum(axis=(1, 2)) + model
+        return mean, (weights * spread).sum(axis=(1, 2))
 
-    def _shortfall(self, forces: np.ndarray, rigidity: np.ndarray) -> np.ndarray:
-        """Return by which share virtual work falls short of forces.
-
-        It counts the motion of a free robot, and a force bends the robot away from that, by the square of the force.
-        """
-        nominal = forces / np.maximum(rigidity, LEAST_RIGIDITY) / self._actuation.sections**2
-        return np.asarray((np.minimum(nominal, LARGEST) / LARGE) ** 2)
+    def _bent(
+        self,
+        force: np.ndarray,
+        variance: np.ndarray,
+        rigidity: np.ndarray,
+        observation: Mapping[str, np.ndarray],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and variance of the force for the levers of the robots that it bends, ``(k,)``."""
+        own, length, offset = observed_ratios(observation, self._settings)
+        unit = self._actuation.sections**2 * rigidity * own / length**2
+        change = self._levers.change(force / unit, observation, offset)
+        force = force / change
+        error = np.minimum(MODEL_ERROR + (force / unit / LARGE) ** 4, 1.0)
+        error = error + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
+        return force, variance / change**2 + (error * force) ** 2
 
     def _on_target(
         self,
@@ -192,12 +209,6 @@ class RobotEstimator:
         error = SHARE_ERROR**2 * share * (1 - share) + SHARE_CHANGE**2 * (share - self._share[index]) ** 2
         self._share[index] = share
         return share * force, share**2 * variance + error * force**2, touching & (share > 0)
-
-
-def _carried(free: np.ndarray, motors: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return free tensions ``(k, c, B)`` where the cables are, from those at the motors; they are linear in both."""
-    near = np.abs(motors) < 1e-6
-    return np.asarray(free[..., None] * (places / np.where(near, 1.0, motors)[..., None]))
 
 
 def _posteriors(shape: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

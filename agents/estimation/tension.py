@@ -12,7 +12,6 @@ from agents.environment import EnvIndex
 from agents.estimation.candidates import Candidates, Loops
 from ccr_gym import Sensing
 
-RIGIDITY = 1.0, 1.0  # mean and standard deviation of the prior of the rigidity ratio
 SMOOTHNESS = 0.9  # weight of the past in the lines through tensions in contact, per step
 SLIP = 0.02  # standard deviation of a tension in contact from such a line, over the tension
 COUNTED = 0.5  # share of the evidence before contact that counts, as the nominal tension is only nearly known
@@ -42,6 +41,9 @@ class TensionFilter:
     def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float) -> None:
         self._limit, self._kept = limit, 1 - candidates.losses
         self.noise = max(sensing.tension_noise[1], LEAST)
+        self._range = sensing.rigidity_ratio
+        self._usual, spread = float(np.mean(self._range)), max(np.ptp(self._range) / np.sqrt(12), LEAST)
+        self._ridge = (self.noise / spread) ** 2  # what the prior of the rigidity ratio weighs
         zero = max(sensing.tension_zero[1] / np.sqrt(3), LEAST)
         self._prior = (self.noise / zero) ** 2  # readings that the prior of a zero is worth
         shape = count, commands, len(candidates.plays), len(candidates.losses)
@@ -51,7 +53,7 @@ class TensionFilter:
         self._broken = np.zeros((count, *shape[2:]))  # log-likelihood from contact
         self._onset = np.full(count, np.inf)  # size of the commands at the first contact [a]
         self._margin = 2 * float(candidates.plays[-1])
-        self.rigidity, self.variance = np.full((2, count, *shape[2:]), RIGIDITY[0])
+        self.rigidity, self.variance = np.zeros((2, count, *shape[2:]))
         self.zeros, self.inward = np.zeros(shape), np.ones(shape)
         self.log_likelihood = np.zeros((count, *shape[2:]))
 
@@ -62,7 +64,7 @@ class TensionFilter:
             part[index] = 0.0
         self.inward[index] = 1.0
         self._onset[index] = np.inf
-        self.rigidity[index], self.variance[index] = RIGIDITY[0], RIGIDITY[1] ** 2
+        self.rigidity[index], self.variance[index] = self._usual, self.noise**2 / self._ridge
 
     def update(
         self, tensions: np.ndarray, nominal: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
@@ -99,17 +101,19 @@ class TensionFilter:
         self._squares[index] += np.where(wanted[:, None], tensions**2, 0.0)
 
     def _evidence(self, index: EnvIndex) -> np.ndarray:
-        """Solve for rigidity and zeros of each candidate, and return its log-likelihood, ``(k, B, E)``."""
+        """Solve for rigidity and zeros of each candidate, and return its log-likelihood, ``(k, B, E)``.
+
+        The rigidity is the likeliest one in its range, so that noise never makes it negative.
+        """
         count, sx, sy, sxx, sxy = (total[index] for total in self._sums)
         weight = 1 / (count + self._prior)  # a zero is taken out of each command
         cxx, cxy = (sxx - sx * sx * weight).sum(axis=1), (sxy - sx * sy * weight).sum(axis=1)
         cyy = (self._squares[index][..., None, None] - sy * sy * weight).sum(axis=1)
-        prior = (self.noise / RIGIDITY[1]) ** 2
-        precision = cxx + prior
-        mean = (cxy + prior * RIGIDITY[0]) / precision
+        precision, product = cxx + self._ridge, cxy + self._ridge * self._usual
+        mean = np.clip(product / precision, *self._range)
         self.rigidity[index], self.variance[index] = mean, self.noise**2 / precision
         self.zeros[index] = (sy - mean[:, None] * sx) * weight
-        misfit = cyy + prior * RIGIDITY[0] ** 2 - mean**2 * precision
+        misfit = cyy + self._ridge * self._usual**2 + mean * (mean * precision - 2 * product)
         return np.asarray(COUNTED * (-0.5 * misfit / self.noise**2 - 0.5 * np.log(precision)))
 
     def robot_tensions(self, tensions: np.ndarray, index: EnvIndex) -> tuple[np.ndarray, np.ndarray]:

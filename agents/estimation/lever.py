@@ -1,0 +1,137 @@
+"""By how much a force that bends a robot changes its lever, the motion of the points that touch.
+
+Virtual work is exact for the motion along uniform bending of the points of the robot as it is; the environment tells
+that of the free robot at the same displacement. Between both lies the bend by the force itself. Here the robot is an
+elastica: its curvature falls by the moment of the force, and within each section the cables keep the sum of the angles.
+The direction of the force is the model's, that of the entry ``force_est``. Nothing is fitted.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ccr_gym import Settings, SpatialSettings
+
+LARGEST = 8.0  # force on the nominal robot up to which its bend is followed [EI/L²]
+ROUNDS = 4  # of bending the robot by the force, and of correcting the force by the lever
+BOUNDS = 0.4, 2.5  # of the lever over that of the free robot
+LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
+TINY = 1e-12
+
+
+class Touch(NamedTuple):
+    """Where k robots are touched, and how they are bent there.
+
+    Attributes:
+        below: Parts of the segments below the point that touches, ``(k, n)`` [L].
+        turning: Curvature of the motion that is counted, a pull by a unit, ``(k, n)`` [rad/(L a)].
+        curvature: Curvature of the free robot, ``(k, n)`` [rad/L].
+        aside: Distance of the point from the backbone, to the inner side, ``(k,)`` [L].
+        normal: Angle of the obstacle's push from that across the robot at rest, ``(k,)``; NaN where it is not known.
+    """
+
+    below: np.ndarray
+    turning: np.ndarray
+    curvature: np.ndarray
+    aside: np.ndarray
+    normal: np.ndarray
+
+
+class BentLevers:
+    """Levers of bent robots.
+
+    Args:
+        settings: Settings of the environments.
+    """
+
+    def __init__(self, settings: Settings | SpatialSettings) -> None:
+        robot = settings.robot
+        self._count, lines = robot.segments, np.array(robot.lines_mm, float)
+        self._lines = lines.reshape(len(lines), -1) / settings.scales.length_mm
+        ends = {robot.segments if cable.end is None else cable.end for cable in robot.cables}
+        self._sizes = np.diff([0, *sorted(ends)])  # of the sections [segments]
+        self._range = settings.cable_limit_mm / settings.scales.travel_mm
+
+    def change(
+        self, force: np.ndarray, observation: Mapping[str, np.ndarray], offset: np.ndarray
+    ) -> np.ndarray:
+        """Return levers over those of the free robots, ``(k,)``.
+
+        Args:
+            force: What virtual work of the free robot tells, on a robot of nominal rigidity, ``(k,)`` [EI/L²].
+            observation: Observations, arrays ``(k, ...)``.
+            offset: Offset of the cables over the nominal one, ``(k,)``.
+        """
+        touch = self._touch(observation, offset)
+        curvature, ratio = touch.curvature, np.ones(len(force))
+        for _ in range(ROUNDS):
+            normals = np.where(np.isnan(touch.normal), _angles(touch, curvature)[1], touch.normal)
+            curvature = self._bent(touch, curvature, normals, np.clip(force / ratio, 0.0, LARGEST))
+            free, bent = (_lever(touch, shape, normals) for shape in (touch.curvature, curvature))
+            ratio = np.clip(np.maximum(bent, LEAST_LEVER) / np.maximum(free, LEAST_LEVER), *BOUNDS)
+        return np.asarray(ratio)
+
+    def _touch(self, observation: Mapping[str, np.ndarray], offset: np.ndarray) -> Touch:
+        """Return where robots are touched, on average over the points that touch, and how they are bent."""
+        count, sections = len(offset), len(self._sizes)
+        flags = observation["contact"].astype(float).reshape(count, len(self._lines), -1)
+        flags = flags / np.maximum(flags.sum(axis=(1, 2), keepdims=True), 1.0)
+        place = (flags * np.linspace(0, 1, flags.shape[2])).sum(axis=(1, 2))
+        pulls = self._range * observation["cable"].astype(float).reshape(count, sections, -1) / offset[:, None, None]
+        along = _directions(pulls.sum(axis=1))
+        bends = (pulls * along[:, None]).sum(axis=2)
+        way = np.where(bends.any(axis=1, keepdims=True), _directions(bends), 1 / np.sqrt(sections))
+        return Touch(
+            below=np.clip(place[:, None] - np.arange(self._count) / self._count, 0, 1 / self._count),
+            turning=self._spread(way),
+            curvature=self._spread(bends),
+            aside=(flags.sum(axis=2) @ self._lines * along).sum(axis=1) * offset,
+            normal=_normals(observation["force_est"].astype(float), along),
+        )
+
+    def _spread(self, bends: np.ndarray) -> np.ndarray:
+        """Return the curvatures of segments ``(k, n)`` for bends of the sections ``(k, sections)``."""
+        return np.repeat(self._count * bends / self._sizes, self._sizes, axis=1)
+
+    def _bent(self, touch: Touch, curvature: np.ndarray, normals: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return curvatures under the moments of forces on robots of such curvatures, ``(k, n)``."""
+        angles, at = _angles(touch, curvature)
+        across, up = touch.below * np.sin(angles), touch.below * np.cos(angles)
+        to_across = _above(across) + (touch.aside * np.cos(at))[..., None]
+        to_up = _above(up) - (touch.aside * np.sin(at))[..., None]
+        arms = np.cos(normals)[..., None] * to_up + np.sin(normals)[..., None] * to_across
+        moments = force[..., None] * arms * (touch.below * self._count)
+        starts = np.cumsum([0, *self._sizes[:-1]])
+        means = np.add.reduceat(moments, starts, axis=-1) / self._sizes
+        return np.asarray(touch.curvature - moments + np.repeat(means, self._sizes, axis=-1))
+
+
+def _directions(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors ``(k, d)`` over their lengths, zero where they are."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), TINY))
+
+
+def _angles(touch: Touch, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the angles of the segments ``(k, n)``, and of the disk that touches ``(k,)`` [rad]."""
+    size = curvature.shape[-1]
+    angles = (np.cumsum(curvature, axis=-1) - curvature / 2) / size
+    return angles, (touch.below * curvature).sum(axis=-1)
+
+
+def _above(steps: np.ndarray) -> np.ndarray:
+    """Return the sums of the steps from the middle of each to the end, ``(k, n)``."""
+    return np.asarray(steps.sum(axis=-1, keepdims=True) - np.cumsum(steps, axis=-1) + steps / 2)
+
+
+def _lever(touch: Touch, curvature: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return the motion of the point of bent robots against forces of such normals, ``(k,)`` [L/a]."""
+    (angles, at), (turned, turn) = _angles(touch, curvature), _angles(touch, touch.turning)
+    moved = (touch.below * turned * np.cos(normals[..., None] - angles)).sum(axis=-1)
+    return np.asarray(moved + touch.aside * turn * np.sin(normals - at))
+
+
+def _normals(force: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Return the angles of forces on robots that are bent this way, 0 for one straight against it; NaN for no force."""
+    across = (force[:, :-1] * along).sum(axis=1)
+    return np.asarray(np.where(force.any(axis=1), np.arctan2(force[:, -1], -across), np.nan))
