@@ -34,10 +34,11 @@ class ForceFilter:
         self._zero, self._squares, self._readings = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
         self._past = np.zeros((count, latency + 2))  # forces of virtual work, the present one first
         self._shift, self._spread = np.zeros(count), np.full(count, np.inf)
+        self._variance = np.zeros(count)  # of virtual work
 
     def reset(self, index: EnvIndex) -> None:
         """Start new episodes of some robots."""
-        for part in (self._zero, self._squares, self._readings, self._past, self._shift):
+        for part in (self._zero, self._squares, self._readings, self._past, self._shift, self._variance):
             part[index] = 0.0
         self._spread[index] = np.inf
 
@@ -101,6 +102,8 @@ class ForceFilter:
         zero = noise / readings + self._steps
         size = _length(measured - self._zero[index][:, : measured.shape[1]], noise)
         drift = (DRIFT * change) ** 2 + (LEAST_DRIFT * force) ** 2
+        drift = drift + np.maximum(variance - self._variance[index], 0.0)
+        self._variance[index] = variance
         spread = np.minimum(self._spread[index] + drift, variance + zero)
         shift = np.where(np.isinf(self._spread[index]), 0.0, self._shift[index])
         gain = np.where(touching & read & (then > 0), spread / (spread + noise), 0.0)

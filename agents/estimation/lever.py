@@ -13,9 +13,9 @@ import numpy as np
 
 from ccr_gym import Settings, SpatialSettings
 
-LARGEST = 8.0  # force on the nominal robot up to which its bend is followed [EI/L²]
+LARGEST = 16.0  # force on the nominal robot up to which its bend is followed [EI/L²]
 ROUNDS = 4  # of bending the robot by the force, and of correcting the force by the lever
-BOUNDS = 0.4, 2.5  # of the lever over that of the free robot
+BOUNDS = 0.2, 5.0  # of the lever over that of the free robot
 LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
 TINY = 1e-12
 

@@ -22,7 +22,7 @@ AT_REST = 1e-6  # of a motor [a]
 SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
 SHARE_CHANGE = 0.5  # likewise, over its change in a step
 MODEL_ERROR = 0.02  # standard deviation of virtual work over the force
-LARGE = 8.0  # force on the nominal robot, from which on virtual work tells little [EI/L²]
+LARGE = 12.0  # force on the nominal robot, from which on virtual work tells little [EI/L²]
 
 
 class Knowledge(NamedTuple):
@@ -77,7 +77,8 @@ class RobotEstimator:
         self.loops = Loops(count, commands, candidates)
         self._levers = BentLevers(settings)
         self._slopes = np.zeros((count, commands))  # of the free tension over the motor
-        self._tension = TensionFilter(count, commands, candidates, sensing, limit)
+        gain = float(np.sqrt((settings.actuation.matrix**2).sum(axis=0).max()))
+        self._tension = TensionFilter(count, commands, candidates, sensing, limit, gain)
         self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]), settings.force_span)
         self._seen_std = max(SEEN * float(np.mean(sensing.angle_noise)), LEAST_SEEN)
         error = max(SEEN * float(np.mean(sensing.angle_error)), LEAST_SEEN)

@@ -29,6 +29,7 @@ class TensionFilter:
         candidates: The candidates.
         sensing: Ranges of the imperfections.
         limit: Tension at which the nominal robot stalls [EI/(aL)].
+        gain: Largest root of the sum of squares of the cables' shares in a command, by which their errors add up.
 
     Attributes:
         log_likelihood: Of the candidates of backlash and friction, ``(N, B, E)``.
@@ -38,13 +39,15 @@ class TensionFilter:
         inward: Probabilities that the cables last moved in, ``(N, c, B, E)``.
     """
 
-    def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float) -> None:
+    def __init__(
+        self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float, gain: float
+    ) -> None:
         self._limit, self._kept = limit, 1 - candidates.losses
-        self.noise = max(sensing.tension_noise[1], LEAST)
+        self.noise = max(gain * sensing.tension_noise[1], LEAST)
         self._range = sensing.rigidity_ratio
         self._usual, spread = float(np.mean(self._range)), max(np.ptp(self._range) / np.sqrt(12), LEAST)
         self._ridge = (self.noise / spread) ** 2  # what the prior of the rigidity ratio weighs
-        zero = max(sensing.tension_zero[1] / np.sqrt(3), LEAST)
+        zero = max(gain * sensing.tension_zero[1] / np.sqrt(3), LEAST)
         self._prior = (self.noise / zero) ** 2  # readings that the prior of a zero is worth
         shape = count, commands, len(candidates.plays), len(candidates.losses)
         self._sums = np.zeros((5, *shape))  # of 1, x, y, x², x y
