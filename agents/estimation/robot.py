@@ -7,7 +7,7 @@ import numpy as np
 
 from agents.environment import EnvIndex
 from agents.estimation.candidates import ALL, Candidates, Loops
-from agents.estimation.force import SATURATED, ForceFilter
+from agents.estimation.force import SATURATED, ForceFilter, Work
 from agents.estimation.lever import LEAST_LEVER, BentLevers
 from agents.estimation.shape import observed_commands, observed_ratios
 from agents.estimation.tension import TensionFilter
@@ -22,6 +22,7 @@ AT_REST = 1e-6  # of a motor [a]
 SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
 SHARE_CHANGE = 0.5  # likewise, over its change in a step
 MODEL_ERROR = 0.02  # standard deviation of virtual work over the force
+LEVER_ERROR = 0.005  # standard deviation of a lever [L/a]
 LARGE = 12.0  # force on the nominal robot, from which on virtual work tells little [EI/L²]
 
 
@@ -107,14 +108,14 @@ class RobotEstimator:
         self._tension.update(tensions, nominal, self.loops, touching, index)
         weights, delays = _posteriors(shape, self._tension.log_likelihood[index])
         play = weights.sum(axis=2)
-        force, variance = self._virtual_work(tensions, nominal, levers, weights, index)
+        work = self._virtual_work(tensions, nominal, levers, weights, index)
         latency = _moments(self._candidates.latencies, delays)
         rigidity = self._tension.rigidity[index], self._tension.variance[index]
         mean = (weights * rigidity[0]).sum(axis=(1, 2))
         if "lever" in observation:
-            force, variance = self._bent(force, variance, mean, observation)
-        force, variance, pressing = self._on_target(force, variance, observation, touching, index)
-        force, force_std = self._force.update(observation, force, variance, latency[0], pressing, index)
+            work = self._bent(work, mean, observation)
+        work, pressing = self._on_target(work, observation, touching, index)
+        force, force_std = self._force.update(observation, work, latency[0], pressing, index)
         spread = (weights * (rigidity[1] + (rigidity[0] - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
         half = _moments(self._candidates.plays, play, PLAY_ERROR)
         loss = _moments(self._candidates.losses, weights.sum(axis=1), LOSS_ERROR)
@@ -161,55 +162,51 @@ class RobotEstimator:
 
     def _virtual_work(
         self, tensions: np.ndarray, nominal: np.ndarray, levers: np.ndarray, weights: np.ndarray, index: EnvIndex
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and variance of the force that virtual work of the free robot tells, ``(k,)``."""
+    ) -> Work:
+        """Return the force that virtual work of the free robot tells.
+
+        What tensions lack across the lever, or against it, no force explains: it is doubt about the lever.
+        """
         filtered = self._tension
         factors, levers = filtered.factors(self.loops, index), levers[:, :, None, None]
         robot, doubt = filtered.robot_tensions(tensions, index)
         lacking = robot - filtered.rigidity[index][:, None] * nominal[..., None]
         size = np.maximum((levers**2).sum(axis=1), LEAST_LEVER**2)
-        forces = np.maximum((levers * lacking).sum(axis=1) / size, 0.0)
-        inner = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2
-        inner = inner + (levers**2 * doubt).sum(axis=1)
-        inner = inner + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
+        along = (levers * lacking).sum(axis=1) / size
+        forces = np.maximum(along, 0.0)
         mean = (weights * forces).sum(axis=(1, 2))
-        spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
-        return mean, (weights * spread).sum(axis=(1, 2))
+        unexplained = ((lacking - levers * forces[:, None]) ** 2 - (filtered.noise / factors) ** 2).sum(axis=1)
+        slow = (levers**2 * doubt).sum(axis=1)
+        slow = slow + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
+        slow = slow / size**2 + (forces - mean[:, None, None]) ** 2 + np.maximum(unexplained, 0.0) / size
+        white = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2 / size**2
+        return Work(mean, (weights * slow).sum(axis=(1, 2)), (weights * white).sum(axis=(1, 2)))
 
-    def _bent(
-        self,
-        force: np.ndarray,
-        variance: np.ndarray,
-        rigidity: np.ndarray,
-        observation: Mapping[str, np.ndarray],
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and variance of the force for the levers of the robots that it bends, ``(k,)``."""
+    def _bent(self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray]) -> Work:
+        """Return the force for the levers of the robots that it bends."""
         own, length, offset = observed_ratios(observation, self._settings)
         unit = self._actuation.sections**2 * rigidity * own / length**2
-        change = self._levers.change(force / unit, observation, offset)
-        force = force / change
-        error = np.minimum(MODEL_ERROR + (force / unit / LARGE) ** 4, 1.0)
-        error = error + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
-        return force, variance / change**2 + (error * force) ** 2
+        change = self._levers.change(work.force / unit, observation, offset)
+        lever = np.maximum(np.linalg.norm(observation["lever"], axis=1), LEAST_LEVER)
+        force = work.force / change
+        error = np.hypot(MODEL_ERROR, LEVER_ERROR / lever) + (force / unit / LARGE) ** 4
+        error = np.minimum(error, 1.0) + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
+        return Work(force, work.slow / change**2 + (error * force) ** 2, work.white / change**2)
 
     def _on_target(
-        self,
-        force: np.ndarray,
-        variance: np.ndarray,
-        observation: Mapping[str, np.ndarray],
-        touching: np.ndarray,
-        index: EnvIndex,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return mean and variance of the force on the regulated obstacle, and whether that touches, ``(k,)`` each.
+        self, work: Work, observation: Mapping[str, np.ndarray], touching: np.ndarray, index: EnvIndex
+    ) -> tuple[Work, np.ndarray]:
+        """Return the force on the regulated obstacle, and whether that touches, ``(k,)``.
 
         The model says how several obstacles share the force, where the cables are as the encoders read them.
         """
         if "share" not in observation:
-            return force, variance, touching
+            return work, touching
         share = observation["share"][:, 0].astype(float)
         error = SHARE_ERROR**2 * share * (1 - share) + SHARE_CHANGE**2 * (share - self._share[index]) ** 2
         self._share[index] = share
-        return share * force, share**2 * variance + error * force**2, touching & (share > 0)
+        slow = share**2 * work.slow + error * work.force**2
+        return Work(share * work.force, slow, share**2 * work.white), touching & (share > 0)
 
 
 def _posteriors(shape: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
