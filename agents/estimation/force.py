@@ -13,7 +13,7 @@ LEAST_DRIFT = 0.01  # of such a change, over the force
 LEAST_NOISE = 1e-3  # of the sensor, where it has none [EI/L²]
 EXPECTED = 6.0  # readings that the expected noise of the sensor is worth
 SATURATED = 1 - 1e-6  # of the largest reading
-CORRECTED = 0.05  # standard deviation of a corrected force, over the force: a late reading is of another place
+CORRECTED = 0.03  # standard deviation of a corrected force, over the force: a late reading is of another place
 
 
 class Work(NamedTuple):

@@ -18,11 +18,13 @@ LEAST_SEEN = 1e-3  # of such a standard deviation, where there is no noise [a]
 PLAY_ERROR = 0.001  # standard deviation of a seen command that neither noise nor a constant error explain [a]
 RIGIDITY_ERROR = 0.01  # standard deviation of the nominal tension, over the tension
 LOSS_ERROR = 0.003  # likewise, of the share of friction
+TINY = 1e-6  # of a spread, where there is none
 AT_REST = 1e-6  # of a motor [a]
 SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
 SHARE_CHANGE = 0.5  # likewise, over its change in a step
 MODEL_ERROR = 0.02  # standard deviation of virtual work over the force
 LEVER_ERROR = 0.005  # standard deviation of a lever [L/a]
+STALL_ERROR = 0.3  # likewise over the force, of a robot that stalls, whose cable does not follow the motor
 LARGE = 12.0  # force on the nominal robot, from which on virtual work tells little [EI/L²]
 
 
@@ -85,7 +87,10 @@ class RobotEstimator:
         error = max(SEEN * float(np.mean(sensing.angle_error)), LEAST_SEEN)
         self._offset = (self._seen_std / error) ** 2  # readings that the prior of the seen shape's error is worth
         shape = count, len(candidates.latencies), commands, len(candidates.plays)
-        self._errors, self._squares, self._seen = np.zeros(shape), np.zeros(shape), np.zeros(count)
+        self._sums, self._seen = np.zeros((5, *shape)), np.zeros(count)  # of the errors e, places p, e², p², e p
+        self._scale, spread = _hidden_scale(settings)
+        self._scale_prior = (self._seen_std / max(spread, TINY)) ** 2
+        self._unknown = spread
         self._share = np.zeros(count)  # of the force, that the regulated obstacle had in the model
 
     def reset(self, index: EnvIndex = ALL) -> None:
@@ -93,8 +98,9 @@ class RobotEstimator:
         self.loops.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
-        for part in (self._errors, self._squares, self._seen, self._share, self._slopes):
+        for part in (self._seen, self._share, self._slopes):
             part[index] = 0.0
+        self._sums[:, index] = 0.0
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> Knowledge:
         """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them."""
@@ -113,7 +119,7 @@ class RobotEstimator:
         rigidity = self._tension.rigidity[index], self._tension.variance[index]
         mean = (weights * rigidity[0]).sum(axis=(1, 2))
         if "lever" in observation:
-            work = self._bent(work, mean, observation)
+            work = self._bent(work, mean, observation, index)
         work, pressing = self._on_target(work, observation, touching, index)
         force, force_std = self._force.update(observation, work, latency[0], pressing, index)
         spread = (weights * (rigidity[1] + (rigidity[0] - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
@@ -131,16 +137,25 @@ class RobotEstimator:
         return Knowledge(*(entry[0] for entry in known))
 
     def _update_shape(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
-        """Compare the seen shape with each candidate; return log-likelihoods ``(k, L, B)``."""
+        """Compare the seen shape with each candidate; return log-likelihoods ``(k, L, B)``.
+
+        For a candidate the seen commands are linear in an error of the shape and in the offset of the cables, where that
+        is hidden. A robot that stalls does not follow its motors, so its shape is not counted.
+        """
         seen, (*_, offset) = observed_commands(observation, self._settings), observed_ratios(observation, self._settings)
-        places = self.loops.places[index][:, self._candidates.latencies] / offset[:, None, None, None]
+        places = self.loops.places[index][:, self._candidates.latencies] * (self._scale / offset)[:, None, None, None]
         errors = seen[:, None, :, None] - places  # in units of the robot's own offset, as noise is one of angles
-        self._errors[index] += errors
-        self._squares[index] += errors**2
-        self._seen[index] += 1
+        counted = (self._tension.stalls[index] == 0)[:, None, None, None]
+        for total, term in zip(
+            self._sums, (errors, places, errors**2, places**2, errors * places), strict=True
+        ):
+            total[index] += np.where(counted, term, 0.0)
+        self._seen[index] += counted[:, 0, 0, 0]
         weight = 1 / (self._seen[index] + self._offset)[:, None, None, None]
-        misfit = (self._squares[index] - self._errors[index] ** 2 * weight).sum(axis=2)
-        return np.asarray(-0.5 * misfit / self._seen_std**2)
+        e, p, ee, pp, ep = (total[index] for total in self._sums)
+        precision = (pp - p**2 * weight).sum(axis=2) + self._scale_prior
+        misfit = (ee - e**2 * weight).sum(axis=2) - (ep - e * p * weight).sum(axis=2) ** 2 / precision
+        return np.asarray(-0.5 * misfit / self._seen_std**2 - 0.5 * np.log(precision / self._scale_prior))
 
     def _tensions(self, observation: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return measured and nominal free tensions as forces on the commands, and levers, ``(k, c)`` each."""
@@ -182,15 +197,18 @@ class RobotEstimator:
         white = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2 / size**2
         return Work(mean, (weights * slow).sum(axis=(1, 2)), (weights * white).sum(axis=(1, 2)))
 
-    def _bent(self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray]) -> Work:
+    def _bent(
+        self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray], index: EnvIndex
+    ) -> Work:
         """Return the force for the levers of the robots that it bends."""
         own, length, offset = observed_ratios(observation, self._settings)
         unit = self._actuation.sections**2 * rigidity * own / length**2
         change = self._levers.change(work.force / unit, observation, offset)
         lever = np.maximum(np.linalg.norm(observation["lever"], axis=1), LEAST_LEVER)
         force = work.force / change
-        error = np.hypot(MODEL_ERROR, LEVER_ERROR / lever) + (force / unit / LARGE) ** 4
-        error = np.minimum(error, 1.0) + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
+        error = np.hypot(MODEL_ERROR, LEVER_ERROR / lever) + self._unknown * np.abs(1 - 1 / change)
+        error = np.minimum(error + (force / unit / LARGE) ** 4, 1.0) + STALL_ERROR * (self._tension.stalls[index] > 0)
+        error = error + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
         return Work(force, work.slow / change**2 + (error * force) ** 2, work.white / change**2)
 
     def _on_target(
@@ -207,6 +225,13 @@ class RobotEstimator:
         self._share[index] = share
         slow = share**2 * work.slow + error * work.force**2
         return Work(share * work.force, slow, share**2 * work.white), touching & (share > 0)
+
+
+def _hidden_scale(settings: Settings | SpatialSettings) -> tuple[float, float]:
+    """Return mean and standard deviation of the nominal offset over that of a robot, of which nothing else tells."""
+    hidden = settings.randomize is not None and not settings.randomize.observed
+    ratios = 1 / np.geomspace(*settings.randomize.offset, 33) if hidden else np.ones(1)
+    return float(ratios.mean()), float(ratios.std())
 
 
 def _posteriors(shape: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ SLIP = 0.02  # standard deviation of a tension in contact from such a line, over
 COUNTED = 0.5  # share of the evidence before contact that counts, as the nominal tension is only nearly known
 TRUST = 0.1  # share of the evidence in contact that counts, as errors of neighbouring steps are alike
 STALLED = 0.9  # tension over its limit, from which on a robot may have stalled
+STALL_STEPS = 8  # after a stall, in which a late shape and a motor that ran ahead of its cable tell nothing
 LEAST = 1e-3  # of standard deviations, for candidates without noise [EI/(aL)]
 
 
@@ -37,6 +38,7 @@ class TensionFilter:
         variance: Its variance, ``(N, B, E)``.
         zeros: Means of the zeros, ``(N, c, B, E)`` [EI/(aL)].
         inward: Probabilities that the cables last moved in, ``(N, c, B, E)``.
+        stalls: Steps until what a stall has left of the cables' places is forgotten, ``(N,)``.
     """
 
     def __init__(
@@ -59,11 +61,12 @@ class TensionFilter:
         self.rigidity, self.variance = np.zeros((2, count, *shape[2:]))
         self.zeros, self.inward = np.zeros(shape), np.ones(shape)
         self.log_likelihood = np.zeros((count, *shape[2:]))
+        self.stalls = np.zeros(count, int)
 
     def reset(self, index: EnvIndex) -> None:
         """Start new episodes of some robots."""
         self._sums[:, index] = self._lines[:, index] = 0.0
-        for part in (self._squares, self._broken, self.zeros, self.log_likelihood):
+        for part in (self._squares, self._broken, self.zeros, self.log_likelihood, self.stalls):
             part[index] = 0.0
         self.inward[index] = 1.0
         self._onset[index] = np.inf
@@ -135,8 +138,11 @@ class TensionFilter:
 
         A robot that stalls does not follow its motor, and what it touches may have moved its cable either way.
         """
-        stalled = np.abs(both[1]) > STALLED * self._limit * self.rigidity[index][:, None]
-        return np.where(stalled, 0.5, inward)
+        return np.where(self._stalled(both[1], index), 0.5, inward)
+
+    def _stalled(self, robot: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return whether robots with such tensions may have stalled, ``(k, c, B, E)``."""
+        return np.asarray(np.abs(robot) > STALLED * self._limit * self.rigidity[index][:, None])
 
     def _update_contact(
         self, tensions: np.ndarray, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
@@ -146,6 +152,8 @@ class TensionFilter:
         Where it is open which way a cable last moved, the tensions of both directions are compared.
         """
         both = self._both_ways(tensions, index)
+        stalled = self._stalled(both[0], index).mean(axis=(2, 3)).max(axis=1) > 0.5
+        self.stalls[index] = np.where(stalled, STALL_STEPS, np.maximum(self.stalls[index] - 1, 0))
         expected = self._expected(both, loops.inward(index)[..., None], index)
         at = np.broadcast_to(places[..., None], both.shape[1:])
         count, sl, st, sll, slt = (total[index] for total in self._lines)
@@ -161,7 +169,8 @@ class TensionFilter:
         error = both - mean_t - slope * (at - mean_l)
         likely = np.where(known, -0.5 * error**2 / variance - 0.5 * np.log(variance), 0.0)
         self.inward[index], broken = _judged(expected, likely)
-        self._broken[index] += TRUST * broken.sum(axis=1)
+        following = (self.stalls[index] == 0)[:, None, None]
+        self._broken[index] += np.where(following, TRUST * broken.sum(axis=1), 0.0)
         robot = _mixed(self.inward[index], *both)
         terms = (np.ones_like(robot), at, robot, at * at, at * robot)
         decay = np.where(touching, SMOOTHNESS, 1.0)[:, None, None, None]
