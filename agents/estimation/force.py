@@ -106,8 +106,8 @@ class ForceFilter:
         """Return the corrected force and its standard deviation; a sensor at its limit is not read.
 
         What the sensor differs from virtual work by is the error of either: that of its zero, which stays, and that of
-        virtual work. The difference is followed, and shared out by their variances. It is one of the past: where virtual
-        work has become less certain since, so has the force.
+        virtual work. The difference is followed, and shared out by their variances. It is one of the past: where
+        virtual work has become less certain since, so has the force.
         """
         robots = np.arange(len(latency))
         now, then, before = Work(*past[..., 0]), Work(*past[:, robots, latency]), Work(*past[:, robots, latency + 1])

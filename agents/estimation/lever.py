@@ -53,9 +53,7 @@ class BentLevers:
         self._sizes = np.diff([0, *sorted(ends)])  # of the sections [segments]
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
 
-    def change(
-        self, force: np.ndarray, observation: Mapping[str, np.ndarray], offset: np.ndarray
-    ) -> np.ndarray:
+    def change(self, force: np.ndarray, observation: Mapping[str, np.ndarray], offset: np.ndarray) -> np.ndarray:
         """Return levers over those of the free robots, ``(k,)``.
 
         Args:
@@ -63,7 +61,15 @@ class BentLevers:
             observation: Observations, arrays ``(k, ...)``.
             offset: Offset of the cables over the nominal one, ``(k,)``.
         """
-        touch = self._touch(observation, offset)
+        touching = observation["contact"].any(axis=1)
+        ratio = np.ones(len(force))
+        if touching.any():
+            seen = {key: observation[key][touching] for key in ("contact", "cable", "lever", "force_est")}
+            ratio[touching] = self._change(force[touching], self._touch(seen, offset[touching]))
+        return ratio
+
+    def _change(self, force: np.ndarray, touch: Touch) -> np.ndarray:
+        """Return levers over those of the free robots, ``(k,)``, by bending these and correcting the forces in turn."""
         curvature, ratio = touch.curvature, np.ones(len(force))
         for _ in range(ROUNDS):
             normals = np.where(np.isnan(touch.normal), _angles(touch, curvature)[1], touch.normal)

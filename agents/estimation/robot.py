@@ -139,16 +139,17 @@ class RobotEstimator:
     def _update_shape(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
         """Compare the seen shape with each candidate; return log-likelihoods ``(k, L, B)``.
 
-        For a candidate the seen commands are linear in an error of the shape and in the offset of the cables, where that
-        is hidden. A robot that stalls does not follow its motors, so its shape is not counted.
+        For a candidate the seen commands are linear in an error of the shape and in the offset of the cables, where
+        that is hidden. A robot that stalls does not follow its motors, so its shape is not counted.
         """
-        seen, (*_, offset) = observed_commands(observation, self._settings), observed_ratios(observation, self._settings)
+        seen, (*_, offset) = (
+            observed_commands(observation, self._settings),
+            observed_ratios(observation, self._settings),
+        )
         places = self.loops.places[index][:, self._candidates.latencies] * (self._scale / offset)[:, None, None, None]
         errors = seen[:, None, :, None] - places  # in units of the robot's own offset, as noise is one of angles
         counted = (self._tension.stalls[index] == 0)[:, None, None, None]
-        for total, term in zip(
-            self._sums, (errors, places, errors**2, places**2, errors * places), strict=True
-        ):
+        for total, term in zip(self._sums, (errors, places, errors**2, places**2, errors * places), strict=True):
             total[index] += np.where(counted, term, 0.0)
         self._seen[index] += counted[:, 0, 0, 0]
         weight = 1 / (self._seen[index] + self._offset)[:, None, None, None]
@@ -197,9 +198,7 @@ class RobotEstimator:
         white = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2 / size**2
         return Work(mean, (weights * slow).sum(axis=(1, 2)), (weights * white).sum(axis=(1, 2)))
 
-    def _bent(
-        self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray], index: EnvIndex
-    ) -> Work:
+    def _bent(self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray], index: EnvIndex) -> Work:
         """Return the force for the levers of the robots that it bends."""
         own, length, offset = observed_ratios(observation, self._settings)
         unit = self._actuation.sections**2 * rigidity * own / length**2
@@ -229,8 +228,10 @@ class RobotEstimator:
 
 def _hidden_scale(settings: Settings | SpatialSettings) -> tuple[float, float]:
     """Return mean and standard deviation of the nominal offset over that of a robot, of which nothing else tells."""
-    hidden = settings.randomize is not None and not settings.randomize.observed
-    ratios = 1 / np.geomspace(*settings.randomize.offset, 33) if hidden else np.ones(1)
+    robots = settings.randomize
+    if robots is None or robots.observed:
+        return 1.0, 0.0
+    ratios = 1 / np.exp(np.linspace(*np.log(robots.offset), 33))
     return float(ratios.mean()), float(ratios.std())
 
 

@@ -49,7 +49,8 @@ def observed_ratios(
     if settings.randomize is None or "robot" not in observation:
         one = np.ones(observation["nodes"].shape[:-1])
         return one, one, one
-    return tuple(np.moveaxis(settings.randomize.ratios(observation["robot"].astype(float)), -1, 0))
+    ratios = settings.randomize.ratios(observation["robot"].astype(float))
+    return ratios[..., 0], ratios[..., 1], ratios[..., 2]
 
 
 def _planar_shape(nodes: np.ndarray, reach_mm: float) -> tuple[np.ndarray, np.ndarray]:
