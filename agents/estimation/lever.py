@@ -38,6 +38,26 @@ class Touch(NamedTuple):
     normal: np.ndarray
 
 
+class Shape(NamedTuple):
+    """Shapes of k robots, and how their points that touch move.
+
+    Attributes:
+        angles: Angles of the segments, ``(k, n)`` [rad].
+        at: Angle of the disk that touches, ``(k,)`` [rad].
+        across: Motion of the point across the robot at rest, when a command is pulled, ``(k,)`` [L/a].
+        back: That towards the base.
+    """
+
+    angles: np.ndarray
+    at: np.ndarray
+    across: np.ndarray
+    back: np.ndarray
+
+    def lever(self, normal: np.ndarray) -> np.ndarray:
+        """Return the motion of the point against forces at such angles, ``(k,)`` [L/a]."""
+        return np.asarray(np.cos(normal) * self.across + np.sin(normal) * self.back)
+
+
 class BentLevers:
     """Levers of bent robots.
 
@@ -51,7 +71,9 @@ class BentLevers:
         self._lines = lines.reshape(len(lines), -1) / settings.scales.length_mm
         ends = {robot.segments if cable.end is None else cable.end for cable in robot.cables}
         self._sizes = np.diff([0, *sorted(ends)])  # of the sections [segments]
+        self._starts = np.cumsum(self._sizes) - self._sizes
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
+        self._largest = LARGEST * len(self._sizes) ** 2  # sections that keep their bends are as many times as stiff
 
     def change(self, force: np.ndarray, observation: Mapping[str, np.ndarray], offset: np.ndarray) -> np.ndarray:
         """Return levers over those of the free robots, ``(k,)``.
@@ -70,13 +92,14 @@ class BentLevers:
 
     def _change(self, force: np.ndarray, touch: Touch) -> np.ndarray:
         """Return levers over those of the free robots, ``(k,)``, by bending these and correcting the forces in turn."""
-        curvature, ratio = touch.curvature, np.ones(len(force))
+        shape = free = _shape(touch, touch.curvature)
+        ratio = np.ones(len(force))
         for _ in range(ROUNDS):
-            normals = np.where(np.isnan(touch.normal), _angles(touch, curvature)[1], touch.normal)
-            curvature = self._bent(touch, curvature, normals, np.clip(force / ratio, 0.0, LARGEST))
-            free, bent = (_lever(touch, shape, normals) for shape in (touch.curvature, curvature))
-            ratio = np.clip(np.maximum(bent, LEAST_LEVER) / np.maximum(free, LEAST_LEVER), *BOUNDS)
-        return np.asarray(ratio)
+            normal = np.where(np.isnan(touch.normal), shape.at, touch.normal)
+            shape = _shape(touch, self._bent(touch, shape, normal, np.clip(force / ratio, 0.0, self._largest)))
+            bent, unbent = (np.maximum(robot.lever(normal), LEAST_LEVER) for robot in (shape, free))
+            ratio = np.clip(bent / unbent, *BOUNDS)
+        return ratio
 
     def _touch(self, observation: Mapping[str, np.ndarray], offset: np.ndarray) -> Touch:
         """Return where robots are touched, on average over the points that touch, and how they are bent."""
@@ -100,17 +123,16 @@ class BentLevers:
         """Return the curvatures of segments ``(k, n)`` for bends of the sections ``(k, sections)``."""
         return np.repeat(self._count * bends / self._sizes, self._sizes, axis=1)
 
-    def _bent(self, touch: Touch, curvature: np.ndarray, normals: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Return curvatures under the moments of forces on robots of such curvatures, ``(k, n)``."""
-        angles, at = _angles(touch, curvature)
-        across, up = touch.below * np.sin(angles), touch.below * np.cos(angles)
-        to_across = _above(across) + (touch.aside * np.cos(at))[..., None]
-        to_up = _above(up) - (touch.aside * np.sin(at))[..., None]
-        arms = np.cos(normals)[..., None] * to_up + np.sin(normals)[..., None] * to_across
-        moments = force[..., None] * arms * (touch.below * self._count)
-        starts = np.cumsum([0, *self._sizes[:-1]])
-        means = np.add.reduceat(moments, starts, axis=-1) / self._sizes
-        return np.asarray(touch.curvature - moments + np.repeat(means, self._sizes, axis=-1))
+    def _bent(self, touch: Touch, shape: Shape, normal: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return curvatures under the moments of forces on robots of such shapes, ``(k, n)``."""
+        across, up = (
+            _above(steps) for steps in (touch.below * np.sin(shape.angles), touch.below * np.cos(shape.angles))
+        )
+        across, up = across + (touch.aside * np.cos(shape.at))[:, None], up - (touch.aside * np.sin(shape.at))[:, None]
+        arms = np.cos(normal)[:, None] * up + np.sin(normal)[:, None] * across
+        moments = force[:, None] * arms * (touch.below * self._count)
+        means = np.add.reduceat(moments, self._starts, axis=1) / self._sizes
+        return np.asarray(touch.curvature - moments + np.repeat(means, self._sizes, axis=1))
 
 
 def _directions(vectors: np.ndarray) -> np.ndarray:
@@ -118,23 +140,24 @@ def _directions(vectors: np.ndarray) -> np.ndarray:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), TINY))
 
 
-def _angles(touch: Touch, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the angles of the segments ``(k, n)``, and of the disk that touches ``(k,)`` [rad]."""
-    size = curvature.shape[-1]
-    angles = (np.cumsum(curvature, axis=-1) - curvature / 2) / size
-    return angles, (touch.below * curvature).sum(axis=-1)
+def _angles(curvature: np.ndarray) -> np.ndarray:
+    """Return the angles of the middles of segments, ``(k, n)`` [rad]."""
+    return np.asarray((np.cumsum(curvature, axis=1) - curvature / 2) / curvature.shape[1])
+
+
+def _shape(touch: Touch, curvature: np.ndarray) -> Shape:
+    """Return the shape of robots of some curvature, ``(k, n)``."""
+    angles, at = _angles(curvature), (touch.below * curvature).sum(axis=1)
+    aside = touch.aside * (touch.below * touch.turning).sum(axis=1)
+    moved = touch.below * _angles(touch.turning)
+    across = (moved * np.cos(angles)).sum(axis=1) - aside * np.sin(at)
+    back = (moved * np.sin(angles)).sum(axis=1) + aside * np.cos(at)
+    return Shape(angles, at, across, back)
 
 
 def _above(steps: np.ndarray) -> np.ndarray:
     """Return the sums of the steps from the middle of each to the end, ``(k, n)``."""
     return np.asarray(steps.sum(axis=-1, keepdims=True) - np.cumsum(steps, axis=-1) + steps / 2)
-
-
-def _lever(touch: Touch, curvature: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the motion of the point of bent robots against forces of such normals, ``(k,)`` [L/a]."""
-    (angles, at), (turned, turn) = _angles(touch, curvature), _angles(touch, touch.turning)
-    moved = (touch.below * turned * np.cos(normals[..., None] - angles)).sum(axis=-1)
-    return np.asarray(moved + touch.aside * turn * np.sin(normals - at))
 
 
 def _normals(force: np.ndarray, along: np.ndarray) -> np.ndarray:

@@ -201,12 +201,12 @@ class RobotEstimator:
     def _bent(self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray], index: EnvIndex) -> Work:
         """Return the force for the levers of the robots that it bends."""
         own, length, offset = observed_ratios(observation, self._settings)
-        unit = self._actuation.sections**2 * rigidity * own / length**2
+        unit = rigidity * own / length**2
         change = self._levers.change(work.force / unit, observation, offset)
         lever = np.maximum(np.linalg.norm(observation["lever"], axis=1), LEAST_LEVER)
-        force = work.force / change
+        force, large = work.force / change, LARGE * self._actuation.sections**2
         error = np.hypot(MODEL_ERROR, LEVER_ERROR / lever) + self._unknown * np.abs(1 - 1 / change)
-        error = np.minimum(error + (force / unit / LARGE) ** 4, 1.0) + STALL_ERROR * (self._tension.stalls[index] > 0)
+        error = np.minimum(error + (force / unit / large) ** 4, 1.0) + STALL_ERROR * (self._tension.stalls[index] > 0)
         error = error + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
         return Work(force, work.slow / change**2 + (error * force) ** 2, work.white / change**2)
 
