@@ -58,7 +58,8 @@ class TensionFilter:
         self._broken = np.zeros((count, *shape[2:]))  # log-likelihood from contact
         self._onset = np.full(count, np.inf)  # size of the commands at the first contact [a]
         self._margin = 2 * float(candidates.plays[-1])
-        self.rigidity, self.variance = np.zeros((2, count, *shape[2:]))
+        self.rigidity = np.full((count, *shape[2:]), self._usual)
+        self.variance = np.full(self.rigidity.shape, self.noise**2 / self._ridge)
         self.zeros, self.inward = np.zeros(shape), np.ones(shape)
         self.log_likelihood = np.zeros((count, *shape[2:]))
         self.stalls = np.zeros(count, int)
