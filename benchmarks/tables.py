@@ -206,7 +206,11 @@ def _errors(known: Knowledge, state: PrivilegedState, settings: Any, force: np.n
         chosen = pressing if name == "force" else np.ones(ROBOTS, bool)
         error = np.abs(getattr(known, name) - true)
         within = (error <= 2 * getattr(known, f"{name}_std") + 1e-9)[chosen]
-        shown = error / np.maximum(true, LEAST_FORCE) if name in ("rigidity", "force") else (error > 0.5 if name == "latency" else error)
+        shown = (
+            error / np.maximum(true, LEAST_FORCE)
+            if name in ("rigidity", "force")
+            else (error > 0.5 if name == "latency" else error)
+        )
         if chosen.mean() >= LEAST_SHARE:
             size = np.mean(shown) if name == "latency" else np.median(shown[chosen])
             found[name] = [float(size), float(within.mean())]

@@ -36,7 +36,6 @@ def test_virtual_work_is_the_force_of_the_bent_robot(task):
     force, known, on = pressed(f"CCR/{task}-v1")
     error = np.abs(known - force) / np.maximum(force, 0.1)
     below, above = on & (force < 3), on & (force >= 3) & (force < 6)
-    print(task, np.median(error[below]), np.percentile(error[below], 95), np.percentile(error[above], 95))
     assert np.median(error[below]) < 0.003
     assert np.percentile(error[below], 95) < 0.015
     assert np.percentile(error[above], 95) < 0.06
@@ -45,7 +44,6 @@ def test_virtual_work_is_the_force_of_the_bent_robot(task):
 def test_virtual_work_on_one_of_two_obstacles():
     force, known, on = pressed("CCR/BracedPush-v1")
     error = np.abs(known - force) / np.maximum(force, 0.1)
-    print("braced", np.median(error[on & (force < 3)]), np.percentile(error[on & (force < 3)], 90))
     assert np.median(error[on & (force < 3)]) < 0.003
     assert np.percentile(error[on & (force < 3)], 90) < 0.04
 
@@ -53,7 +51,6 @@ def test_virtual_work_on_one_of_two_obstacles():
 def test_virtual_work_of_a_robot_of_two_sections():
     force, known, on = pressed("CCR/PushObstacle-v1", robot="snake-arm")
     below = on & (force < 3)
-    print("snake", np.median(np.abs(known / np.maximum(force, 0.1) - 1)[below]), below.sum())
     assert np.median(np.abs(known / np.maximum(force, 0.1) - 1)[below]) < 0.02
 
 
