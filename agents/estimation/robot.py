@@ -174,7 +174,7 @@ class RobotEstimator:
         away = np.abs(motors) > AT_REST
         slopes = np.where(away, free / np.where(away, motors, 1.0), self._slopes[index])
         self._slopes[index] = slopes
-        return slopes[..., None] * places
+        return np.asarray(slopes[..., None] * places)
 
     def _virtual_work(
         self, tensions: np.ndarray, nominal: np.ndarray, levers: np.ndarray, weights: np.ndarray, index: EnvIndex
@@ -231,7 +231,8 @@ def _hidden_scale(settings: Settings | SpatialSettings) -> tuple[float, float]:
     robots = settings.randomize
     if robots is None or robots.observed:
         return 1.0, 0.0
-    ratios = 1 / np.exp(np.linspace(*np.log(robots.offset), 33))
+    low, high = np.log(robots.offset)
+    ratios = np.exp(-np.linspace(low, high, 33))
     return float(ratios.mean()), float(ratios.std())
 
 

@@ -46,8 +46,8 @@ class TensionFilter:
     ) -> None:
         self._limit, self._kept = limit, 1 - candidates.losses
         self.noise = max(gain * sensing.tension_noise[1], LEAST)
-        self._range = sensing.rigidity_ratio
-        self._usual, spread = float(np.mean(self._range)), max(np.ptp(self._range) / np.sqrt(12), LEAST)
+        self._least, self._most = sensing.rigidity_ratio
+        self._usual, spread = (self._least + self._most) / 2, max((self._most - self._least) / np.sqrt(12), LEAST)
         self._ridge = (self.noise / spread) ** 2  # what the prior of the rigidity ratio weighs
         zero = max(gain * sensing.tension_zero[1] / np.sqrt(3), LEAST)
         self._prior = (self.noise / zero) ** 2  # readings that the prior of a zero is worth
@@ -117,7 +117,7 @@ class TensionFilter:
         cxx, cxy = (sxx - sx * sx * weight).sum(axis=1), (sxy - sx * sy * weight).sum(axis=1)
         cyy = (self._squares[index][..., None, None] - sy * sy * weight).sum(axis=1)
         precision, product = cxx + self._ridge, cxy + self._ridge * self._usual
-        mean = np.clip(product / precision, *self._range)
+        mean = np.clip(product / precision, self._least, self._most)
         self.rigidity[index], self.variance[index] = mean, self.noise**2 / precision
         self.zeros[index] = (sy - mean[:, None] * sx) * weight
         misfit = cyy + self._ridge * self._usual**2 + mean * (mean * precision - 2 * product)
