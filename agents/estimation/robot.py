@@ -61,8 +61,8 @@ class RobotEstimator:
     contact force from virtual work: what the cable pulls more than the free robot needs, over the lever of the contact.
     A force sensor, where there is one, corrects the force with the delay that was found.
 
-    Offset and length of random robots are read from the observation; where ``randomize`` hides them, the robots are
-    taken to be the nominal one.
+    Offset and length of random robots are read from the observation. Where ``randomize`` hides them, the offset is
+    found beside the backlash, and the length is taken for the nominal one.
 
     Args:
         settings: Settings of the environments.
