@@ -123,7 +123,7 @@ def played(entry: Entry) -> Result | None:
 
 def set_point(env_id: str) -> float:
     """Return the mean set-point of the test scenes, over the steps that are scored [mN]."""
-    env, goals = make_env(env_id, split="test"), []
+    env, goals = make_env(env_id, sensing="realistic", split="test"), []
     moving = "desired_ahead" in env.observation_space.spaces
     for seed in range(EVALUATION_SEED, EVALUATION_SEED + EPISODES):
         _, info = env.reset(seed=seed)
