@@ -67,6 +67,7 @@ class BentLevers:
 
     def __init__(self, settings: Settings | SpatialSettings) -> None:
         robot = settings.robot
+        self._is_rod = robot.model == "rod"  # the disks of the paper's model shear against its backbone instead
         self._count, lines = robot.segments, np.array(robot.lines_mm, float)
         self._lines = lines.reshape(len(lines), -1) / settings.scales.length_mm
         ends = {robot.segments if cable.end is None else cable.end for cable in robot.cables}
@@ -85,7 +86,7 @@ class BentLevers:
         """
         touching = observation["contact"].any(axis=1)
         ratio = np.ones(len(force))
-        if touching.any():
+        if self._is_rod and touching.any():
             seen = {key: observation[key][touching] for key in ("contact", "cable", "lever", "force_est")}
             ratio[touching] = self._change(force[touching], self._touch(seen, offset[touching]))
         return ratio

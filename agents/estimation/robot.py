@@ -142,10 +142,8 @@ class RobotEstimator:
         For a candidate the seen commands are linear in an error of the shape and in the offset of the cables, where
         that is hidden. A robot that stalls does not follow its motors, so its shape is not counted.
         """
-        seen, (*_, offset) = (
-            observed_commands(observation, self._settings),
-            observed_ratios(observation, self._settings),
-        )
+        seen = observed_commands(observation, self._settings)
+        *_, offset = observed_ratios(observation, self._settings)
         places = self.loops.places[index][:, self._candidates.latencies] * (self._scale / offset)[:, None, None, None]
         errors = seen[:, None, :, None] - places  # in units of the robot's own offset, as noise is one of angles
         counted = (self._tension.stalls[index] == 0)[:, None, None, None]
