@@ -8,6 +8,7 @@ from solver.common.presets import PRESETS, Preset
 from solver.common.rod import Cable, Load
 from solver.common.rows import Rows
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 from solver.common.trace import Trace
 from solver.common.transmission import Transmission
@@ -74,6 +75,7 @@ __all__ = [
     "free_motion",
     "free_nodes",
     "free_tension",
+    "held_signals",
     "onset_tension",
     "point_forces",
     "sensitivity",

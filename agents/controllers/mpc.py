@@ -10,6 +10,7 @@ from agents.environment import Environment, require_entries, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search, set_points
 from agents.tuned import MPCSettings
+from solver import held_signals
 
 SMALLEST = 0.006  # change of force that is worth crossing the backlash [EI/L²]
 
@@ -112,9 +113,10 @@ class PredictiveController:
 
     def _plan(self, gain: float, force: float, goals: np.ndarray) -> float:
         """Return the first move of a plan, in full increments."""
-        programme = plan(self.settings.horizon, self.settings.effort)
-        moves = programme(p=np.concatenate([[gain, force], goals]), lbx=-1.0, ubx=1.0)["x"]
-        return float(moves[0])
+        with held_signals():
+            programme = plan(self.settings.horizon, self.settings.effort)
+            moves = programme(p=np.concatenate([[gain, force], goals]), lbx=-1.0, ubx=1.0)["x"]
+            return float(moves[0])
 
 
 @cache

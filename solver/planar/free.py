@@ -9,6 +9,7 @@ import numpy as np
 from solver.common.checks import check_scene
 from solver.common.geometry import touching_gaps
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.validation import check_instance, check_number, check_whole
 from solver.planar.equilibrium import touching_points
 from solver.planar.formulation import arc_function
@@ -131,6 +132,7 @@ def _check_node(robot: Robot, node: int) -> int:
     return check_whole("node", node, 0, robot.segments)
 
 
+@held_signals()
 def _segment(robot: Robot, cable_mm: float) -> _Segment:
     """Return the segment that all of the free robot's are, in the rod by Newton's method on the cable length."""
     cable_mm = _check_cable(robot, cable_mm)
