@@ -68,7 +68,7 @@ class Family:
         point, values = ca.SX.sym("point", 2), ca.SX.sym("sizes", sizes)
         try:
             returned = function(point, values)
-        except (RuntimeError, NotImplementedError) as error:  # of CasADi
+        except (RuntimeError, NotImplementedError, TypeError) as error:  # of CasADi
             raise ValueError(f"function fails on CasADi symbols of a point and {sizes} sizes: {error}") from error
         if not (isinstance(returned, ca.SX) and returned.is_scalar() and returned.nnz() == 1):
             raise ValueError(f"function returned {shown(returned)}; it must return one CasADi expression of the point")
