@@ -101,8 +101,8 @@ class MemoryVecEnv(VecEnvWrapper):
     shown: dict[str, np.ndarray]
 
     def __init__(self, venv: VecEnv) -> None:
-        assert isinstance(venv.observation_space, spaces.Dict)
         check_kind("venv", venv, VecEnv, "give environments of Stable-Baselines3, such as SB3VecEnv")
+        assert isinstance(venv.observation_space, spaces.Dict)
         settings = venv.get_attr("settings", [0])[0]
         self._memory = Memory(venv.observation_space, venv.num_envs, settings)
         super().__init__(venv, spaces.Box(-np.inf, np.inf, (self._memory.size,), np.float32))
