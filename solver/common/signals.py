@@ -28,7 +28,7 @@ def held_signals() -> Iterator[None]:
 def _record(stack: ExitStack) -> None:
     """Record signals until a stack ends, which hands them to their handlers once all of these are back in place."""
     arrived: list[tuple[int, FrameType | None]] = []
-    handlers = {number: handler for number in HELD if callable(handler := signal.getsignal(number))}
+    handlers = {int(number): handler for number in HELD if callable(handler := signal.getsignal(number))}
 
     def deliver() -> None:
         for number, frame in dict(arrived).items():

@@ -59,16 +59,16 @@ def virtual_work(
         TypeError: If ``operations`` is of another class.
     """
     check_instance("operations", operations, Operations, "take NUMBERS or ARRAYS of solver.common.operations")
-    slopes = check_sequence("slopes", slopes, "three slopes (x', y', φ')")
-    if len(slopes) != 3:
+    given = check_sequence("slopes", slopes, "three slopes (x', y', φ')")
+    if len(given) != 3:
         raise refusal("slopes", slopes, "three slopes (x', y', φ')")
-    x, y, load, in_x, in_y, turn, offset_mm = (
+    x, y, load, in_x, in_y, turn, offset = (
         _check_value(name, value, operations)
-        for name, value in zip(VIRTUAL_WORK, (x, y, load, *slopes, offset_mm), strict=True)
+        for name, value in zip(VIRTUAL_WORK, (x, y, load, *given, offset_mm), strict=True)
     )
     check_alike(**{name: np.shape(value) for name, value in (("x", x), ("y", y), ("load", load), ("slopes", in_x))})
     work = x * in_x + y * in_y
-    return offset_mm * load * turn / operations.where(work < 0, work, -math.inf)
+    return offset * load * turn / operations.where(work < 0, work, -math.inf)
 
 
 def _check_value(name: str, value: object, operations: Operations) -> Value:
