@@ -281,10 +281,10 @@ def _check_motion(robot: Robot, motion: Motion) -> None:
     """Check that a motion is one of a robot."""
     check_instance("robot", robot, Robot, "the motions are those of robots of the plane")
     check_instance("motion", motion, Motion, "take one of free_motion or shape_motion")
-    nodes, count = (robot.segments + 1, 3), len(robot.cables)
+    nodes = (robot.segments + 1, 3)
     check_numbers("motion.nodes", motion.nodes, (..., *nodes))
-    check_numbers("motion.slopes", motion.slopes, (..., count, *nodes))
-    check_numbers("motion.tensions", motion.tensions, (..., count))
+    slopes = check_numbers("motion.slopes", motion.slopes, (..., -1, *nodes))
+    check_numbers("motion.tensions", motion.tensions, (..., slopes.shape[-3]))
 
 
 def _check_flags(name: str, value: object) -> np.ndarray:
