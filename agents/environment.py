@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 
 import ccr_gym  # noqa: F401 - registers the ids
+from agents.arguments import check_kind
 
 Observation = dict[str, np.ndarray]
 Environment = gymnasium.Env[Observation, np.ndarray]
@@ -18,7 +19,11 @@ def make_env(env_id: str, **kwargs: object) -> Environment:
     Args:
         env_id: Id of the environment.
         **kwargs: Arguments of the environment.
+
+    Raises:
+        TypeError: If the id is no text.
     """
+    check_kind("env_id", env_id, str, "give the id of an environment, one of ccr_gym.ENV_IDS")
     return gymnasium.make(env_id, None, True, obs_mode="dict", **kwargs)
 
 
@@ -33,8 +38,8 @@ def require_env(env: Environment | None) -> Environment:
     return env
 
 
-def require_entries(observation: Observation) -> None:
-    """Refuse an observation without named entries.
+def require_entries(observation: Observation, *names: str) -> None:
+    """Refuse an observation without named entries, or without those of some names.
 
     Raises:
         ValueError: If it is none of ``obs_mode="dict"``.
@@ -43,3 +48,5 @@ def require_entries(observation: Observation) -> None:
         raise ValueError(
             f'the observation is a {type(observation).__name__}; policies need named entries: obs_mode="dict"'
         )
+    if missing := [name for name in names if not isinstance(observation.get(name), np.ndarray)]:
+        raise ValueError(f"the observation has no array {missing[0]!r}; take one of an environment of ccr_gym")

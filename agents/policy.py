@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from agents.environment import Environment, Observation
+from agents.environment import Environment, Observation, require_entries
 from ccr_gym import AHEAD, PrivilegedState, Scales
 
 __all__ = ["Observation", "Policy", "motor_actions", "natural", "search", "set_points"]
@@ -34,7 +34,11 @@ def search(observation: Observation) -> np.ndarray:
 
     Args:
         observation: The observation of one robot, or of many.
+
+    Raises:
+        ValueError: If the observation is none of ``obs_mode="dict"``.
     """
+    require_entries(observation, "desired_force", "cable")
     many, commands = observation["desired_force"].shape[:-1], observation["cable"].shape[-1]
     pull = np.ones((*many, commands), np.float32)
     if "obstacle" in observation:

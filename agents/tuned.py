@@ -1,8 +1,10 @@
 """Settings of controllers and learners, tuned on training scenes with realistic sensing (``ccr-gym sweep``)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, TypeVar
 
+GainsT = TypeVar("GainsT")
 Gains = dict[str, tuple[float, float]]
 PI_GAINS: dict[str, Gains] = {  # action per EI/L² of change in the force error; action per EI/L² of force error
     "realistic": {
@@ -191,6 +193,18 @@ LearnerSettings = PPOSettings | RecurrentPPOSettings | SACSettings | DistilledSe
 LEARNERS: dict[str, type[LearnerSettings]] = {
     kind.name: kind for kind in (PPOSettings, RecurrentPPOSettings, SACSettings, DistilledSettings)
 }
+
+
+def tuned_gains(gains: Mapping[str, Mapping[str, GainsT]], env_id: str, sensing: str | None) -> GainsT:
+    """Return the gains for an environment and its sensing, ``None`` for the one it is usually evaluated with.
+
+    Raises:
+        ValueError: If nothing was tuned for the environment.
+    """
+    known = gains[tuned_for(env_id, sensing)] if isinstance(env_id, str) else {}
+    if env_id not in known:
+        raise ValueError(f"env_id is {env_id!r:.80}; it must be one of {', '.join(gains['realistic'])}")
+    return known[env_id]
 
 
 def tuned_for(env_id: str, sensing: str | None) -> str:

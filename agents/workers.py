@@ -21,13 +21,19 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     ignore interrupts; this process handles them. If it is killed, they end as well.
 
     Raises:
-        UserError: If one of them dies.
+        UserError: If they cannot be started, or one of them dies.
     """
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")  # read when the libraries are loaded, in new processes
     context = multiprocessing.get_context("spawn")  # torch does not survive a fork
     others = multiprocessing.active_children()
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_end_with_parent)
+    try:  # what they share are files in memory
+        pool = ProcessPoolExecutor(count, mp_context=context, initializer=_end_with_parent)
+    except OSError as error:
+        raise UserError(
+            f"worker processes cannot be started: {error.strerror or error}; they need room in shared memory "
+            "(/dev/shm), and limits (ulimit) that allow files and semaphores"
+        ) from error
     try:
         _start(pool, count)
         yield pool

@@ -7,6 +7,7 @@ nothing in an environment is a number of millimetres or newtons: it is a multipl
 from typing import NamedTuple
 
 from solver.common.robot import AnyRobot
+from solver.common.validation import check_instance
 
 FORCE_SPAN = 10.0  # force on a robot of one section that is observed as 1 [EI/L²]
 TENSION_SPAN = 10.0  # tension of a robot of one section that is observed as 1 [EI/(aL)]
@@ -31,6 +32,11 @@ class Scales(NamedTuple):
 
     @classmethod
     def of(cls, robot: AnyRobot) -> "Scales":
-        """Return the natural units of a robot."""
+        """Return the natural units of a robot.
+
+        Raises:
+            TypeError: If it is no robot.
+        """
+        check_instance("robot", robot, AnyRobot, "take a solver.Robot or solver.spatial.SpatialRobot")
         length, offset, rigidity = robot.length_mm, robot.offset_mm, robot.rigidity
         return cls(length, offset, rigidity / length / length, rigidity / offset / length)

@@ -9,6 +9,7 @@ from solver.common.quasi_static import natural_frequency, quasi_static_rate
 from solver.common.rod import Cable, Load
 from solver.common.rows import Rows
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 from solver.common.trace import Trace
 from solver.common.transmission import Transmission
@@ -75,6 +76,7 @@ __all__ = [
     "free_motion",
     "free_nodes",
     "free_tension",
+    "held_signals",
     "natural_frequency",
     "onset_tension",
     "point_forces",

@@ -15,7 +15,7 @@ OPTIONAL = ["torch", "stable_baselines3", "matplotlib", "pygame"]
 PUBLIC = {"solver", "solver.spatial", "ccr_gym", "agents"}
 # What the modules of a room may import of this project, beside their own room.
 ROOMS = {
-    "solver.cache": {"solver.common.validation"},
+    "solver.cache": {"solver.common.signals", "solver.common.validation"},
     "solver.common": {"solver._kernel", "solver.cache"},
     "solver.planar": {"solver._kernel", "solver.common", "solver.cache"},
     "solver.spatial": {"solver._kernel", "solver.common", "solver.cache"},

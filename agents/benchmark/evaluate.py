@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from agents.arguments import check_kind, check_whole
 from agents.environment import make_env
 from agents.policy import Policy
 from solver import Equilibrium, Status
@@ -12,6 +13,7 @@ from solver.spatial import SpatialEquilibrium
 
 TOLERANCE = 0.05  # relative force error that counts as success
 SEARCH = 24  # first steps, in which contact is found; their errors do not count
+MOST = 2**31 - 1  # of seeds and episodes
 STEADY = 16  # last steps, for the steady-state error
 
 
@@ -80,7 +82,12 @@ METRICS = tuple(field.name for field in fields(Metrics))
 
 
 def measure(episode: Episode) -> Metrics:
-    """Return the metrics of an episode."""
+    """Return the metrics of an episode.
+
+    Raises:
+        TypeError: If it is no :class:`Episode`.
+    """
+    check_kind("episode", episode, Episode, "take one of run_episode")
     touching, outside = episode.force > 0, np.flatnonzero(episode.error > TOLERANCE)
     return Metrics(
         rmse_mn=_rms_mn(episode.error_n[SEARCH:]),
@@ -106,6 +113,8 @@ def run_episode(policy: Policy, env_id: str, seed: int, keep: bool = False, **kw
         keep: Whether to keep the equilibria.
         **kwargs: Arguments of the environment, such as ``sensing`` and ``split``.
     """
+    if not (callable(getattr(policy, "reset", None)) and callable(getattr(policy, "act", None))):
+        check_kind("policy", policy, (), "give an object with the methods reset and act of agents.Policy")
     env = make_env(env_id, **kwargs)
     regulated = {"true": "force_true", "estimate": "force_est"}[env.get_wrapper_attr("settings").regulate]
     observation, info = env.reset(seed=seed)
@@ -138,7 +147,12 @@ def _forces(goal: np.ndarray | float, force: np.ndarray, estimated: np.ndarray, 
 
 
 def run_episodes(policy: Policy, env_id: str, seed: int, count: int, **kwargs: object) -> list[Episode]:
-    """Play episodes with consecutive seeds."""
+    """Play episodes with consecutive seeds.
+
+    Raises:
+        ValueError: If the first seed is no whole number, or the count no positive one.
+    """
+    seed, count = check_whole("seed", seed, 0, MOST), check_whole("count", count, 1, MOST)
     return [run_episode(policy, env_id, seed + i, False, **kwargs) for i in range(count)]
 
 

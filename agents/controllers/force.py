@@ -4,10 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from agents.arguments import LARGEST, check_real
 from agents.environment import Environment, require_entries, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search
-from agents.tuned import P_GAINS, PI_GAINS, tuned_for
+from agents.tuned import P_GAINS, PI_GAINS, tuned_gains
 
 
 @dataclass(slots=True)
@@ -23,6 +24,9 @@ class ForceController:
         proportional: Action per EI/L² of change in the force error.
         integral: Action per EI/L² of force error.
         name: Name of the policy.
+
+    Raises:
+        ValueError: If a gain is no finite number.
     """
 
     proportional: float = 0.3
@@ -32,6 +36,10 @@ class ForceController:
     _estimator: RobotEstimator = field(init=False)
     _span: float = field(init=False)  # force that is observed as 1 [EI/L²]
 
+    def __post_init__(self) -> None:
+        self.proportional = check_real("proportional", self.proportional, -LARGEST)
+        self.integral = check_real("integral", self.integral, -LARGEST)
+
     @classmethod
     def tuned(cls, env_id: str, sensing: str | None = None) -> "ForceController":
         """Return the controller with the gains that were best on training scenes.
@@ -39,13 +47,16 @@ class ForceController:
         Args:
             env_id: Id of the environment.
             sensing: Its sensing; ``None`` for the one that it is usually evaluated with.
+
+        Raises:
+            ValueError: If nothing was tuned for the environment.
         """
-        return cls(*PI_GAINS[tuned_for(env_id, sensing)][env_id])
+        return cls(*tuned_gains(PI_GAINS, env_id, sensing))
 
     @classmethod
     def proportional_only(cls, env_id: str, sensing: str | None = None) -> "ForceController":
         """Return the tuned controller whose action is proportional to the force error; see :meth:`tuned`."""
-        return cls(0.0, P_GAINS[tuned_for(env_id, sensing)][env_id], "P")
+        return cls(0.0, tuned_gains(P_GAINS, env_id, sensing), "P")
 
     def reset(self, env: Environment | None = None) -> None:
         """Forget the last error and what was known of the robot.

@@ -6,10 +6,12 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
+from agents.arguments import check_kind
 from agents.environment import Environment, require_entries, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search, set_points
 from agents.tuned import MPCSettings
+from solver import held_signals
 
 SMALLEST = 0.006  # change of force that is worth crossing the backlash [EI/L²]
 
@@ -27,6 +29,9 @@ class PredictiveController:
     Attributes:
         settings: Assumptions, and weights of the plan.
         name: Name of the policy.
+
+    Raises:
+        TypeError: If ``settings`` are none of a plan.
     """
 
     settings: MPCSettings = field(default_factory=MPCSettings)
@@ -36,6 +41,9 @@ class PredictiveController:
     _readings: list[tuple[float, float]] = field(default_factory=list, init=False)
     _steps: list[int] = field(default_factory=list, init=False)  # of the readings
     _step: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        check_kind("settings", self.settings, MPCSettings, "give MPCSettings of agents.tuned")
 
     def reset(self, env: Environment | None = None) -> None:
         """Forget the episode and take the robot and the range of its motors from the environment.
@@ -112,9 +120,10 @@ class PredictiveController:
 
     def _plan(self, gain: float, force: float, goals: np.ndarray) -> float:
         """Return the first move of a plan, in full increments."""
-        programme = plan(self.settings.horizon, self.settings.effort)
-        moves = programme(p=np.concatenate([[gain, force], goals]), lbx=-1.0, ubx=1.0)["x"]
-        return float(moves[0])
+        with held_signals():
+            programme = plan(self.settings.horizon, self.settings.effort)
+            moves = programme(p=np.concatenate([[gain, force], goals]), lbx=-1.0, ubx=1.0)["x"]
+            return float(moves[0])
 
 
 @cache

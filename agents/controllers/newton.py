@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from agents.arguments import check_real
 from agents.environment import Environment, require_entries, require_env
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, motor_actions, natural, search, set_points
@@ -28,6 +29,9 @@ class NewtonController:
         gain: Share of a Newton step that is made.
         damping: Slope of the force below which it is not trusted [EI/L² per a].
         name: Name of the policy.
+
+    Raises:
+        ValueError: If gain or damping is no number of their ranges.
     """
 
     oracle: bool = False
@@ -37,6 +41,10 @@ class NewtonController:
     _env: Environment = field(init=False)
     _actions: ActionSpec = field(init=False)
     _estimator: RobotEstimator = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.gain = check_real("gain", self.gain, 0.0)
+        self.damping = check_real("damping", self.damping, 0.0)
 
     @classmethod
     def knowing(cls) -> "NewtonController":

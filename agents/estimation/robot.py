@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from agents.arguments import check_kind, check_whole
 from agents.environment import EnvIndex
 from agents.estimation.candidates import ALL, Candidates, Loops
 from agents.estimation.force import SATURATED, ForceFilter, Work
@@ -67,9 +68,15 @@ class RobotEstimator:
     Args:
         settings: Settings of the environments.
         count: Number N of robots.
+
+    Raises:
+        ValueError: If the count is no positive whole number.
+        TypeError: If ``settings`` are none of an environment.
     """
 
     def __init__(self, settings: Settings | SpatialSettings, count: int) -> None:
+        check_kind("settings", settings, (Settings, SpatialSettings), "take those of an environment")
+        check_whole("count", count, 1, 2**31 - 1)
         self._settings, self._actuation = settings, settings.actuation
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
         self._tension_span = settings.tension_span

@@ -14,11 +14,12 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 
+from agents.arguments import check_kind, check_real
 from agents.config import TrainConfig
 from agents.environment import Environment, make_env, require_entries
 from agents.errors import UserError
 from agents.files import JsonObject
-from agents.learning.checks import Form, check_curve, check_real, check_tensors
+from agents.learning.checks import Form, check_curve, check_tensors
 from agents.learning.memory import Memory
 from agents.learning.network import LSTMState, Network, normalized, standard_deviation
 from agents.learning.pretrained import SUFFIX
@@ -98,9 +99,11 @@ class LearnedPolicy:
     Raises:
         FileNotFoundError: If the file does not exist.
         UserError: If it is not a trained policy.
+        TypeError: If ``path`` is no path.
     """
 
     def __init__(self, path: Path) -> None:
+        check_kind("path", path, Path, "give a pathlib.Path")
         self.path = path = path if path.suffix == SUFFIX else path / ACTOR
         if path.is_dir():
             raise UserError(f"{path} is a folder; a trained policy is a file: move it away, and train again")

@@ -19,6 +19,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 
+from agents.arguments import check_real, check_whole
 from agents.config import VALIDATION_SEED, TrainConfig
 from agents.errors import UserError
 from agents.files import JsonObject
@@ -26,9 +27,7 @@ from agents.learning.checks import (
     Form,
     check_curve,
     check_names,
-    check_real,
     check_tensors,
-    check_whole,
     moment_forms,
 )
 from agents.learning.learners import WARM_UP

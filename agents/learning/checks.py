@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import torch
 
+from agents.arguments import LARGEST, check_real, check_whole
 from agents.learning.network import EPSILON
 from agents.learning.tensors import Tensors
 
-LARGEST = 1e9  # of what is neither a weight nor a square, in size
 WEIGHT = torch.finfo(torch.float16).max  # in which policies are kept
 LOG = 40.0  # largest logarithm, so that single precision holds the square of its exponential
 BOUNDS = {  # of tensors by the last part of their names; the others are weights
@@ -101,28 +101,6 @@ def _check_values(name: str, tensor: torch.Tensor) -> None:
 
 def _text(form: Form) -> str:
     return f"shape {form.shape} and type {form.dtype}"
-
-
-def check_whole(name: str, value: object, low: int, high: float) -> int:
-    """Return a whole number within bounds.
-
-    Raises:
-        ValueError: Naming the value and the bounds.
-    """
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ValueError(f"{name} is {value!r:.80}; it must be a whole number from {low} to {high}")
-    return value
-
-
-def check_real(name: str, value: object, low: float, high: float = LARGEST) -> float:
-    """Return a number within bounds as a float.
-
-    Raises:
-        ValueError: Naming the value and the bounds.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise ValueError(f"{name} is {value!r:.80}; it must be a number from {low} to {high}")
-    return float(value)
 
 
 def check_curve(steps: object, returns: object, most: float = math.inf) -> tuple[list[int], list[float]]:

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from solver import Equilibrium, force_true, sensitivity
+from agents.arguments import check_kind, check_whole
+from solver import Equilibrium, Sensitivity, force_true, sensitivity
 
 
 class _Context(torch.autograd.function.FunctionCtx):
@@ -80,8 +81,17 @@ def differentiable(
         Nodes ``(b, n+1, 3)`` [mm, mm, rad], tensions ``(b,)`` [N], forces on the robot ``(b, m, 2)`` [N].
 
     Raises:
-        ValueError: If the values are not one row of ``len(rows)`` for each equilibrium.
+        ValueError: If the values are not one row of ``len(rows)`` for each equilibrium, or a row is none of theirs.
+        TypeError: If ``values`` is no tensor, or ``equilibria`` are none of the plane.
     """
+    check_kind("values", values, torch.Tensor, "give a tensor of the values that the equilibria were solved for")
+    check_kind("equilibria", equilibria, (list, tuple), "give a list of equilibria")
+    check_kind("rows", rows, (list, tuple, range), "give the indices of rows, as (0,)")
+    for equilibrium in equilibria:
+        check_kind("equilibria", equilibrium, Equilibrium, "give results of solvers of the plane")
+        obstacles = Sensitivity.rows(equilibrium.robot)
+        last = obstacles.length + obstacles.motions * len(equilibrium.scene)
+        rows = [check_whole("rows", row, 0, last) for row in rows]
     table = values[:, None] if values.ndim == 1 else values
     if table.shape != (len(equilibria), len(rows)):
         raise ValueError(f"values has shape {tuple(values.shape)}; it must be ({len(equilibria)}, {len(rows)})")

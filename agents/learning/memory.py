@@ -12,6 +12,7 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from agents.arguments import check_kind
 from agents.environment import EnvIndex
 from agents.estimation.candidates import ALL
 from agents.estimation.robot import Knowledge, RobotEstimator
@@ -100,6 +101,7 @@ class MemoryVecEnv(VecEnvWrapper):
     shown: dict[str, np.ndarray]
 
     def __init__(self, venv: VecEnv) -> None:
+        check_kind("venv", venv, VecEnv, "give environments of Stable-Baselines3, such as SB3VecEnv")
         assert isinstance(venv.observation_space, spaces.Dict)
         settings = venv.get_attr("settings", [0])[0]
         self._memory = Memory(venv.observation_space, venv.num_envs, settings)

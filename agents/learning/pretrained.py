@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from agents.arguments import check_kind
 from agents.config import PRETRAINED
 
 SUFFIX = ".safetensors"
@@ -14,7 +15,13 @@ def trained(learner: str, env_id: str, folder: Path = PRETRAINED) -> tuple[Path,
         learner: ``"PPO"``, ``"RecurrentPPO"``, ``"SAC"`` or ``"Distilled"``.
         env_id: Id of the environment.
         folder: Folder of trained policies, as ``ccr-gym retrain`` writes it; by default those in the package.
+
+    Raises:
+        TypeError: If a name is no text or the folder no path.
     """
+    check_kind("learner", learner, str, "give the name of a learner")
+    check_kind("env_id", env_id, str, "give the id of an environment")
+    check_kind("folder", folder, Path, "give a pathlib.Path")
     return tuple(sorted((folder / learner / folder_name(env_id)).glob(f"*{SUFFIX}")))
 
 

@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from agents.arguments import check_kind
 from agents.files import write_text
 from agents.paper.claims import claims
 from agents.paper.comparison import scores
@@ -17,7 +18,12 @@ def reproduce(folder: Path) -> list[Claim]:
     """Write the page ``paper.md``, its figures and ``paper.json`` into a folder, print it, and return the claims.
 
     Beside it stands ``two_models.md``, six scenes in both models.
+
+    Raises:
+        UserError: If a file cannot be written.
+        TypeError: If ``folder`` is no path.
     """
+    check_kind("folder", folder, Path, "give a pathlib.Path")
     folder.mkdir(parents=True, exist_ok=True)
     found, scored = claims(), scores()
     draw_comparison(folder / "table_1.png")

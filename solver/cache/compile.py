@@ -11,6 +11,7 @@ from pathlib import Path
 import casadi as ca
 
 from solver.cache.artefacts import ArtefactStore, artefact_key
+from solver.common.signals import held_signals
 
 COMPILERS = ["cc", "gcc", "clang", "c++"]
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
@@ -55,6 +56,7 @@ def _load(path: Path) -> ctypes.CDLL:
         ) from error
 
 
+@held_signals()
 def _source(function: ca.Function) -> str:
     """Return the C source of a function."""
     generator = ca.CodeGenerator("law", {"casadi_int": "int"})

@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 
 from solver.common.rod import AnyRod, full_cables
+from solver.common.validation import check_alike, check_instance, check_numbers, check_whole
 
 RIGHT_ANGLE = 1e-12  # cosines below it are roundoff
 
@@ -44,7 +45,14 @@ class Actuation:
         Args:
             robot: The robot.
             space: Dimensions of a point, 2 or 3.
+
+        Raises:
+            ValueError: If the robot is not one of this space.
+            TypeError: If it is no robot.
         """
+        check_instance("robot", robot, AnyRod, "take a solver.Robot or solver.spatial.SpatialRobot")
+        own = len(robot.weight_per_length)
+        check_whole("space", space, own, own, "the robot's own")
         cables, axes = len(robot.cables), space - 1
         given = full_cables(robot)
         sides = np.array([cable.hole_mm[:axes] for cable in given]) / robot.offset_mm
@@ -66,7 +74,7 @@ class Actuation:
 
     def cables_mm(self, commands: np.ndarray) -> np.ndarray:
         """Return the displacements of the cables, ``(..., cables)``, for commands ``(..., commands)`` [mm]."""
-        return _product(self.matrix, commands)
+        return _product(self.matrix, "commands", commands)
 
     def reached(self, commands: np.ndarray, cables_mm: np.ndarray) -> np.ndarray:
         """Return the commands that robots have reached whose pulled cables may have stopped short.
@@ -75,23 +83,25 @@ class Actuation:
             commands: What was commanded, ``(..., commands)`` [mm].
             cables_mm: Displacements reached, ``(..., cables)`` [mm].
         """
+        wanted, cables_mm = self.cables_mm(commands), check_numbers("cables_mm", cables_mm, (..., len(self.matrix)))
         if self.recovery is None:
             return cables_mm.copy()
-        wanted = self.cables_mm(commands)
+        check_alike(commands=wanted.shape[:-1], cables_mm=cables_mm.shape[:-1])
         short = np.where(wanted > 0, np.minimum(cables_mm - wanted, 0.0), 0.0)
-        return np.asarray(commands + _product(self.recovery, short))
+        return np.asarray(commands + _product(self.recovery, "cables_mm", short))
 
     def steady(self, direction: np.ndarray) -> np.ndarray:
         """Return commands that bend all sections in a direction ``(..., axes)``, ``(..., commands)``."""
-        return _product(self.directions, direction)
+        return _product(self.directions, "direction", direction)
 
     def forces(self, tensions: np.ndarray) -> np.ndarray:
         """Return the tensions' work per command, ``(..., commands)``, for tensions ``(..., cables)`` [N]."""
-        return _product(self.matrix.T, tensions)
+        return _product(self.matrix.T, "tensions", tensions)
 
 
-def _product(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def _product(matrix: np.ndarray, name: str, vectors: np.ndarray) -> np.ndarray:
     """Return products with vectors, ``(..., rows)``, added term by term: the bits do not depend on their number."""
+    vectors = check_numbers(name, vectors, (..., matrix.shape[1]))
     total = vectors[..., 0, None] * matrix[:, 0]
     for column in range(1, matrix.shape[1]):
         total = total + vectors[..., column, None] * matrix[:, column]

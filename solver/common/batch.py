@@ -135,9 +135,11 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
 
         Raises:
             ValueError: If there is no scene, and as :meth:`assign`.
+            TypeError: If ``other`` is not a batch.
         """
-        scene, robot = other.scene(index), other._robots[index]
-        if robot != self._robots[index] or other.layout.obstacles != self.layout.obstacles:
+        check_instance("other", other, RobotBatch, "take a batch of equal robots")
+        scene, robot = other.scene(index), other.robot_of(index)
+        if robot != self.robot_of(index) or other.layout.obstacles != self.layout.obstacles:
             return self.assign(index, scene, robot)
         with self._exclusive:
             self._put(self._check_index(index), scene, other._compiled[index])

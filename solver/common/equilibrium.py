@@ -10,6 +10,7 @@ import numpy as np
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 from solver.common.validation import check_instance, check_whole, refusal
 
@@ -209,6 +210,7 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
     def _node_point(self) -> tuple[np.ndarray, np.ndarray]:
         """Return unknowns and parameters of the node-coordinate problem."""
 
+    @held_signals()
     def node_solution(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return the equilibrium as a solution of the node-coordinate problem.
 
@@ -225,6 +227,7 @@ class BaseEquilibrium(ABC, Generic[RobotT_co]):
         pushed = gap_slopes.T @ ca.DM(self.inequality_multipliers)
         return (slope - pushed).full().ravel(), _full(equality_slopes)
 
+    @held_signals()
     def residuals(self) -> Residuals:
         """Recompute the optimality conditions of the node-coordinate problem from the shape and multipliers alone.
 

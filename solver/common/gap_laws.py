@@ -7,6 +7,8 @@ from typing import NamedTuple, TypeVar
 
 import casadi as ca
 
+from solver.common.signals import held_signals
+
 
 def circle_gap(point: ca.SX, shape: ca.SX) -> ca.SX:
     """Return the gap to a circle or a sphere ``shape = (center, r)``: ``(|p − c|² − r²) / 2r``."""
@@ -88,6 +90,7 @@ def _sinc_slope(square: Symbol, order: int) -> Symbol:
 
 
 @lru_cache(maxsize=64)
+@held_signals()
 def gap_function(law: GapLaw) -> ca.Function:
     """Return ``(p, shape) → c, c_x, c_y, c_xx, c_xy, c_yy`` of one kind of obstacle, and likewise in space."""
     point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
@@ -99,6 +102,7 @@ def gap_function(law: GapLaw) -> ca.Function:
 
 
 @lru_cache(maxsize=64)
+@held_signals()
 def clearance_function(law: GapLaw) -> ca.Function:
     """Return ``(p, shape) → c`` of one kind of obstacle, where the slopes are not needed."""
     point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
@@ -106,6 +110,7 @@ def clearance_function(law: GapLaw) -> ca.Function:
 
 
 @lru_cache(maxsize=64)
+@held_signals()
 def slope_function(law: GapLaw) -> ca.Function:
     """Return ``(p, shape) → c_p`` of one kind of obstacle."""
     point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)

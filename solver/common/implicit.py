@@ -9,6 +9,7 @@ import numpy as np
 from solver.common.equilibrium import BaseEquilibrium
 from solver.common.robot import AnyRobot
 from solver.common.scene import MAX_OBSTACLES
+from solver.common.signals import held_signals
 from solver.common.validation import check_whole, shown
 
 
@@ -60,6 +61,7 @@ class Response(NamedTuple):
     load: np.ndarray
 
 
+@held_signals()
 def respond(
     equilibrium: BaseEquilibrium[AnyRobot], kkt: ca.Function, active: np.ndarray | None, closed: list[bool]
 ) -> Response:

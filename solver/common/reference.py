@@ -23,6 +23,7 @@ from solver.common.layout import Layout
 from solver.common.node_problem import NodeProblem
 from solver.common.rod import AnyRod
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 
 LEAST_SHARE = 1e-9  # of the loads, which stands for none
@@ -81,7 +82,9 @@ class RodBranch:
         limit under a part of the loads is not: the status is ``GAVE_UP`` then.
         """
         command = np.array([*np.zeros(self._cables), self._robot.length_mm, 0.0])
-        slacks = self._constraints(unstressed, self._parameters(command)).full().ravel()[self._equalities :]
+        with held_signals():
+            values = self._constraints(unstressed, self._parameters(command)).full().ravel()
+        slacks = values[self._equalities :]
         command[: self._cables] = np.minimum(slacks[: self._cables], 0.0)
         start = RodPoint(command, unstressed, np.zeros(self._lower.size))
         loaded = any(self._robot.weight_per_length) or bool(self._robot.loads)
@@ -135,6 +138,7 @@ class RodBranch:
         fixed = [self._robot.offset_mm] if self._space == 2 else []  # which in the plane is a parameter
         return [*command[:-1], *fixed, rigidity, *self._scene.parameters]
 
+    @held_signals()
     def _solve_part(self, present: RodPoint, command: np.ndarray, part: float) -> RodPoint | None:
         """Return the solution part of the way to a command, ``None`` where IPOPT finds none or leaves the branch."""
         target = command if part == 1 else present.command + part * (command - present.command)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence, Sized
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from solver.common.validation import SMALLEST, check_number, check_positive, check_sequence, check_whole, refusal
 
@@ -16,6 +16,7 @@ THIRDS = 80  # of the range of angles in the search for the longest edge of a be
 MAX_POINTS = 2**18  # that can touch, on all lines together
 
 
+@runtime_checkable
 class AnyRobot(Protocol):
     """A robot of the plane or of space; see :class:`solver.Robot` for its fields."""
 

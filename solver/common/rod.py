@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -95,6 +95,7 @@ class Load:
         return distance * math.cos(angle), distance * math.sin(angle)
 
 
+@runtime_checkable
 class AnyRod(AnyRobot, Protocol):
     """A robot whose model may be the rod; see :class:`solver.Robot` for its fields."""
 

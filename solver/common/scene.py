@@ -37,8 +37,8 @@ class Scene:
         for obstacle in self.obstacles:
             if not isinstance(obstacle, Obstacle):
                 raise TypeError(
-                    f"{shown(obstacle)} is not an obstacle; give a Circle, HalfPlane, Ellipse, Capsule, Polygon or "
-                    "Custom, or in space one of solver.spatial"
+                    f"an entry of obstacles is {shown(obstacle)}; give a Circle, HalfPlane, Ellipse, Capsule, "
+                    "Polygon or Custom, or in space one of solver.spatial"
                 )
         if len({obstacle.space for obstacle in self.obstacles}) > 1:
             raise ValueError(

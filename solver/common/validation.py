@@ -189,7 +189,7 @@ def check_array(name: str, value: object, shape: Shape, low: Bounds, high: Bound
     Args:
         name: Name of the field.
         value: An array, or a nested sequence.
-        shape: Required shape, not (); −1 stands for any length of an axis, ``...`` first for any leading axes.
+        shape: Required shape, as :func:`check_numbers`.
         low: Least values, one in all or one for each column.
         high: Largest values, likewise.
         bound: What the numbers must be, in words.
@@ -197,16 +197,43 @@ def check_array(name: str, value: object, shape: Shape, low: Bounds, high: Bound
     Raises:
         ValueError: Naming the value, its shape and the bound.
     """
-    try:
-        numbers = np.asarray(value)
-    except ValueError as error:  # rows of different lengths
-        raise refusal(name, value, f"numbers of shape {shape}") from error
-    if not (numbers.dtype.kind in "iuf" and _fits(numbers.shape, shape)):
-        raise refusal(name, value, f"numbers of shape {shape}, not {numbers.dtype} of {numbers.shape}")
-    numbers = np.ascontiguousarray(numbers, float)
+    numbers = np.asarray(check_numbers(name, value, shape), float, order="C")
     if not ((numbers >= low) & (numbers <= high)).all():
         raise ValueError(f"{name} is {shown(value)}; all must be {bound}")
     return numbers
+
+
+def check_numbers(name: str, value: object, shape: Shape) -> np.ndarray:
+    """Return real numbers of any size as an array, which is the one given where that is an array.
+
+    Args:
+        name: Name of the field.
+        value: An array, or a nested sequence.
+        shape: Required shape; −1 stands for any length of an axis, ``...`` first for any leading axes.
+
+    Raises:
+        ValueError: Naming the value and its shape.
+    """
+    try:
+        numbers = np.asarray(value)
+    except ValueError as error:  # rows of different lengths
+        raise refusal(name, value, _numbers_of(shape)) from error
+    if not (numbers.dtype.kind in "iuf" and _fits(numbers.shape, shape)):
+        raise refusal(name, value, f"{_numbers_of(shape)}, not {numbers.dtype} of {numbers.shape}")
+    return numbers
+
+
+def check_alike(**shapes: tuple[int, ...]) -> None:
+    """Check that leading axes of arrays, given by name, are of the same robots: equal, or 1 or missing.
+
+    Raises:
+        ValueError: Naming the arrays and their axes.
+    """
+    try:
+        np.broadcast_shapes(*shapes.values())
+    except ValueError as error:
+        given = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ValueError(f"the robots of {given} differ; give arrays of as many robots") from error
 
 
 def check_points(value: object, space: int) -> np.ndarray:
@@ -248,10 +275,14 @@ def _with_article(noun: str) -> str:
     return f"{'an' if noun[0] in 'AEIOU' else 'a'} {noun}"
 
 
+def _numbers_of(shape: Shape) -> str:
+    return f"numbers of shape {shape}".replace("Ellipsis", "...") if shape != (...,) else "numbers of any shape"
+
+
 def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
-    """Return whether an array has a wanted shape, as described in :func:`check_array`."""
-    if wanted[0] is ...:
-        shape, wanted = shape[1 - len(wanted) :], wanted[1:]
+    """Return whether an array has a wanted shape, as described in :func:`check_numbers`."""
+    if wanted[:1] == (...,):
+        shape, wanted = shape[max(len(shape) - len(wanted) + 1, 0) :], wanted[1:]
     return len(shape) == len(wanted) and all(w in (-1, n) for n, w in zip(shape, wanted, strict=True))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from solver._kernel import SHAPE_SIZE
 from solver.common.gap_laws import GapLaw, gap_function
 from solver.common.obstacle import Extent, Obstacle
+from solver.common.signals import held_signals
 from solver.common.validation import (
     Pair,
     check_finite,
@@ -120,6 +121,7 @@ class Custom(Obstacle):
     def _radii(self) -> list[tuple[str, float]]:
         return [("reach", self.reach), ("the sharpest radius", self.extent.min_curvature_radius)]
 
+    @held_signals()
     def measure(self, points: np.ndarray) -> np.ndarray:
         """Return gap and gradient at points, which are not checked, ``(..., 3)``."""
         values = np.asarray(gap_function(self.law)(points.reshape(-1, 2).T, self.parameters))

@@ -20,12 +20,23 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from solver.common.geometry import subdivide
-from solver.common.validation import LARGEST, check_array, check_finite, check_instance, check_positive
+from solver.common.validation import (
+    LARGEST,
+    check_alike,
+    check_array,
+    check_finite,
+    check_instance,
+    check_numbers,
+    check_positive,
+    check_whole,
+    refusal,
+)
 from solver.planar.equilibrium import Equilibrium
 from solver.planar.robot import Robot
 
 NEWTON_ITERATIONS = 5  # for the free robot's angle; the start is off by the square of the angle
 SPREAD = math.log(3)  # standard deviation of k around 1 before anything is measured
+MAX_ROBOTS = 2**31 - 1  # along an axis
 LEAST_SLOPE = 0.02  # of a contact's motion against its force, over L/a; below, a pull hardly presses on it
 
 
@@ -61,7 +72,7 @@ class RigidityFit:
     @classmethod
     def prior(cls, *shape: int) -> Self:
         """Return the state before anything is measured, k = 1, of robots in an array of a shape."""
-        weight = np.full(shape, SPREAD**-2)
+        weight = np.full([check_whole("shape", count, 0, MAX_ROBOTS) for count in shape], SPREAD**-2)
         return cls(weight, weight)
 
     @property
@@ -81,8 +92,15 @@ class RigidityFit:
             tension_noise_n: Standard deviation of the measured tension [N].
 
         Raises:
-            ValueError: If the noise is not positive.
+            ValueError: If the noise is not positive, or the tensions are not finite numbers of these robots.
         """
+        tensions, free_tensions = (
+            check_array(name, given, (..., -1), -LARGEST, LARGEST, "finite")
+            for name, given in (("tensions", tensions), ("free_tensions", free_tensions))
+        )
+        touching = _check_flags("touching", touching)
+        check_alike(tensions=tensions.shape, free_tensions=free_tensions.shape)
+        check_alike(tensions=tensions.shape[:-1], touching=touching.shape, products=np.shape(self.products))
         weight = np.where(touching, 0.0, check_positive("tension_noise_n", tension_noise_n) ** -2)
         products, squares = (np.sum(other * free_tensions, axis=-1) for other in (tensions, free_tensions))
         return type(self)(self.products + weight * products, self.squares + weight * squares)
@@ -135,7 +153,12 @@ def _estimate(nominal: Equilibrium, motion: Motion, tension: float, rigidity_rat
 
 
 def point_forces(equilibrium: Equilibrium) -> np.ndarray:
-    """Return the force of each obstacle on each point of the robot, by energy, ``(m, p, k, 2)`` [N]."""
+    """Return the force of each obstacle on each point of the robot, by energy, ``(m, p, k, 2)`` [N].
+
+    Raises:
+        TypeError: If ``equilibrium`` is not one of the plane.
+    """
+    check_instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
     multipliers, points = equilibrium.multipliers, equilibrium.points
     forces = np.zeros((*multipliers.shape, 2))
     for touch in np.argwhere(equilibrium.contact):
@@ -161,7 +184,17 @@ def force_factor(
         forces: Nominal force of each obstacle on each point, ``(..., m, p, k, 2)`` [N], as :func:`point_forces`.
         tensions: Measured tensions, ``(..., c)`` [N].
         rigidity_ratio: Rigidity over its nominal value k, ``(...)``.
+
+    Raises:
+        ValueError: If an array is not one of numbers, or not of this robot's shapes.
+        TypeError: If the robot is not one of the plane, or ``motion`` is no motion.
     """
+    _check_motion(robot, motion)
+    forces = check_numbers("forces", forces, (..., -1, len(robot.lines_mm), robot.positions, 2))
+    tensions = check_numbers("tensions", tensions, (..., motion.tensions.shape[-1]))
+    rigidity_ratio = check_numbers("rigidity_ratio", rigidity_ratio, (...,))
+    leading = {"forces": forces.shape[:-4], "tensions": tensions.shape[:-1], "rigidity_ratio": rigidity_ratio.shape}
+    check_alike(motion=motion.tensions.shape[:-1], **leading)
     slopes = point_slopes(robot, motion)
     pressed = forces.sum(axis=-4)
     works = -np.sum(pressed[..., None, :, :, :] * slopes, axis=(-3, -2, -1))
@@ -181,8 +214,14 @@ def point_slopes(robot: Robot, motion: Motion) -> np.ndarray:
 
 
 def free_motion(robot: Robot, cable_mm: np.ndarray, length_mm: np.ndarray) -> Motion:
-    """Return pose, slopes and tension of the free robot at cable displacements and lengths ``(...)`` [mm]."""
-    cable_mm, length_mm = np.asarray(cable_mm), np.asarray(length_mm)
+    """Return pose, slopes and tension of the free robot at cable displacements and lengths ``(...)`` [mm].
+
+    Raises:
+        ValueError: If a displacement is beyond what any robot of these disks can take up, or a length not from half to
+            twice the robot's.
+        TypeError: If the robot is not one of the plane.
+    """
+    cable_mm, length_mm = _check_measured(robot, cable_mm, length_mm)
     angle, chord = _free_segment(robot, cable_mm / robot.segments, length_mm / robot.segments)
     middles = (np.arange(robot.segments) + 0.5) * angle[..., None]
     nodes = np.zeros((*angle.shape, robot.segments + 1, 3))
@@ -202,9 +241,16 @@ def shape_motion(robot: Robot, nodes: np.ndarray, cable_mm: np.ndarray, length_m
         nodes: Node poses, ``(..., n+1, 3)`` [mm, mm, rad].
         cable_mm: Cable displacements, ``(...)`` [mm].
         length_mm: Lengths of the backbone, ``(...)`` [mm].
+
+    Raises:
+        ValueError: As :func:`free_motion`, or if the poses are not finite or not those of this robot's nodes.
+        TypeError: If the robot is not one of the plane.
     """
+    cable_mm, length_mm = _check_measured(robot, cable_mm, length_mm)
+    nodes = check_array("nodes", nodes, (..., robot.segments + 1, 3), -LARGEST, LARGEST, "finite")
+    check_alike(nodes=nodes.shape[:-2], cable_mm=cable_mm.shape, length_mm=length_mm.shape)
     ahead, angles = np.diff(nodes[..., :2], axis=-2), -np.diff(nodes[..., 2], axis=-1)
-    length, pull = np.asarray(length_mm)[..., None] / robot.segments, np.asarray(cable_mm)[..., None] / robot.segments
+    length, pull = length_mm[..., None] / robot.segments, cable_mm[..., None] / robot.segments
     if robot.model == "rod":
         stretch = _sinc_slope(angles / 2) / (2 * np.sinc(angles / (2 * np.pi)))  # c'/c, of the chord in the angle
         taken = robot.offset_mm * np.cos(angles / 2) - length * _sinc_slope(angles / 2) / 2
@@ -218,6 +264,35 @@ def shape_motion(robot: Robot, nodes: np.ndarray, cable_mm: np.ndarray, length_m
     energy_scale = robot.rigidity / (2 * length[..., 0])
     tensions = 2 * energy_scale * np.sum(angles * turns, axis=-1)
     return Motion(nodes, _node_slopes(ahead, stretch * turns, turns)[..., None, :, :], tensions[..., None])
+
+
+def _check_measured(robot: Robot, cable_mm: np.ndarray, length_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return displacements of the cable and lengths of a robot as arrays; both may be noisy, and beyond its range."""
+    check_instance("robot", robot, Robot, "the motions are those of robots of the plane")
+    low, high = robot.shortest_mm / 2, 2 * robot.longest_mm
+    length_mm = check_array("length_mm", length_mm, (...,), low, high, f"from {low:.6g} to {high:.6g}")
+    most = min(robot.longest_mm, 2 * robot.segments * robot.offset_mm)
+    cable_mm = check_array("cable_mm", cable_mm, (...,), -most, most, f"from {-most:.6g} to {most:.6g}")
+    check_alike(cable_mm=cable_mm.shape, length_mm=length_mm.shape)
+    return cable_mm, length_mm
+
+
+def _check_motion(robot: Robot, motion: Motion) -> None:
+    """Check that a motion is one of a robot."""
+    check_instance("robot", robot, Robot, "the motions are those of robots of the plane")
+    check_instance("motion", motion, Motion, "take one of free_motion or shape_motion")
+    nodes = (robot.segments + 1, 3)
+    check_numbers("motion.nodes", motion.nodes, (..., *nodes))
+    slopes = check_numbers("motion.slopes", motion.slopes, (..., -1, *nodes))
+    check_numbers("motion.tensions", motion.tensions, (..., slopes.shape[-3]))
+
+
+def _check_flags(name: str, value: object) -> np.ndarray:
+    """Return whether something holds, of one robot or of many, as an array of bool."""
+    flags = np.asarray(value)
+    if flags.dtype != bool:
+        raise refusal(name, value, "a bool or an array of bool")
+    return flags
 
 
 def _node_slopes(ahead: np.ndarray, stretch: np.ndarray, turns: np.ndarray) -> np.ndarray:

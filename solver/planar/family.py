@@ -9,6 +9,7 @@ from typing import Self
 import casadi as ca
 
 from solver._kernel import SHAPE_SIZE
+from solver.common.signals import held_signals
 from solver.common.validation import check_instance, check_whole, shown
 
 UNARY = (
@@ -67,12 +68,13 @@ class Family:
         point, values = ca.SX.sym("point", 2), ca.SX.sym("sizes", sizes)
         try:
             returned = function(point, values)
-        except (RuntimeError, NotImplementedError) as error:  # of CasADi
+        except (RuntimeError, NotImplementedError, TypeError) as error:  # of CasADi
             raise ValueError(f"function fails on CasADi symbols of a point and {sizes} sizes: {error}") from error
         if not (isinstance(returned, ca.SX) and returned.is_scalar() and returned.nnz() == 1):
             raise ValueError(f"function returned {shown(returned)}; it must return one CasADi expression of the point")
-        traced = ca.Function("family", [point, values], [returned])
-        steps = [_step(traced, k) for k in range(traced.n_instructions())]
+        with held_signals():
+            traced = ca.Function("family", [point, values], [returned])
+            steps = [_step(traced, k) for k in range(traced.n_instructions())]
         return cls(json.dumps({"sizes": sizes, "steps": steps}))
 
     @property
@@ -103,6 +105,7 @@ def _step(function: ca.Function, k: int) -> list[str | int | float]:
 
 
 @lru_cache(maxsize=64)
+@held_signals()
 def _rebuild(text: str) -> ca.Function:
     """Return the function of a family's text, which may hold elementary operations only."""
     try:

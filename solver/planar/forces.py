@@ -12,10 +12,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.common.operations import NUMBERS, Operations, Value
-from solver.common.validation import LARGEST, check_array, check_finite, check_instance, check_pair, check_positive
+from solver.common.validation import (
+    LARGEST,
+    check_alike,
+    check_array,
+    check_finite,
+    check_instance,
+    check_numbers,
+    check_pair,
+    check_positive,
+    check_sequence,
+    is_real,
+    refusal,
+)
 from solver.planar.equilibrium import Equilibrium
 from solver.planar.free import clearance, fitted_slopes, free_tension
 from solver.planar.robot import Robot
+
+VIRTUAL_WORK = ("x", "y", "load", "slopes", "slopes", "slopes", "offset_mm")  # names of the numbers it takes
 
 
 def force_true(equilibrium: Equilibrium) -> np.ndarray:
@@ -39,10 +53,29 @@ def virtual_work(
         slopes: Slopes of the free tip's x, y and angle [mm, mm, rad per mm].
         offset_mm: Distance a of the cable from the backbone [mm].
         operations: :data:`~solver.common.operations.NUMBERS` or :data:`~solver.common.operations.ARRAYS`.
+
+    Raises:
+        ValueError: If a value is no number, nor an array of them where these are expected.
+        TypeError: If ``operations`` is of another class.
     """
-    in_x, in_y, turn = slopes
+    check_instance("operations", operations, Operations, "take NUMBERS or ARRAYS of solver.common.operations")
+    given = check_sequence("slopes", slopes, "three slopes (x', y', φ')")
+    if len(given) != 3:
+        raise refusal("slopes", slopes, "three slopes (x', y', φ')")
+    x, y, load, in_x, in_y, turn, offset = (
+        _check_value(name, value, operations)
+        for name, value in zip(VIRTUAL_WORK, (x, y, load, *given, offset_mm), strict=True)
+    )
+    check_alike(**{name: np.shape(value) for name, value in (("x", x), ("y", y), ("load", load), ("slopes", in_x))})
     work = x * in_x + y * in_y
-    return offset_mm * load * turn / operations.where(work < 0, work, -math.inf)
+    return offset * load * turn / operations.where(work < 0, work, -math.inf)
+
+
+def _check_value(name: str, value: object, operations: Operations) -> Value:
+    """Return a number, or where operations are those of arrays, one or an array of numbers of any size."""
+    if operations is NUMBERS or is_real(value):
+        return check_finite(name, value)
+    return check_numbers(name, value, (...,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +160,15 @@ def onset_tension(before: Equilibrium, now: Equilibrium) -> float:
     Args:
         before: Equilibrium before the step.
         now: Equilibrium after the step.
+
+    Raises:
+        ValueError: If they are of different robots.
+        TypeError: If they are not equilibria of the plane.
     """
+    for name, given in (("before", before), ("now", now)):
+        check_instance(name, given, Equilibrium, "take one of a solver of the plane")
+    if before.robot != now.robot:
+        raise ValueError("before and now are equilibria of different robots; take those of one step")
     if not now.multipliers.any():
         return 0.0
     if before.multipliers.any():

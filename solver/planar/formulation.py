@@ -29,6 +29,7 @@ from solver.common.gap_laws import (
     square_distance,
 )
 from solver.common.node_problem import NodeProblem, first_derivatives, grow, norms, second_derivatives, subdivide
+from solver.common.signals import held_signals
 from solver.planar.robot import Robot
 from solver.planar.rod_formulation import Pose, pose, rod_inequality_count, rod_objective, rod_segments
 
@@ -265,12 +266,14 @@ def _twice_spring_energy(spring: ca.MX, moved: ca.MX) -> ca.MX:
 
 
 @lru_cache(maxsize=32)
+@held_signals()
 def node_derivatives(robot: Robot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Return the :func:`~solver.common.node_problem.first_derivatives` of :func:`node_problem`."""
     return first_derivatives(node_problem(robot, laws, mounted))
 
 
 @lru_cache(maxsize=32)
+@held_signals()
 def kkt_derivatives(robot: Robot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Return the :func:`~solver.common.node_problem.second_derivatives` of :func:`node_problem`."""
     change = ca.MX.sym("change", len(robot.cables) + 1 + MOTIONS * len(laws))

@@ -9,6 +9,7 @@ import numpy as np
 from solver.common.checks import check_scene
 from solver.common.geometry import touching_gaps
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.validation import check_instance, check_number, check_whole
 from solver.planar.equilibrium import touching_points
 from solver.planar.formulation import arc_function
@@ -71,12 +72,12 @@ def fitted_slopes(robot: Robot, low_mm: float, high_mm: float, node: int | None 
         ValueError: If the range is too small to fit a line to, or it or the node is out of the robot's range.
         TypeError: If the robot is not one of the plane.
     """
-    node = robot.segments if node is None else _check_node(robot, node)
     low, high = _check_cable(robot, low_mm), _check_cable(robot, high_mm)
+    node = robot.segments if node is None else _check_node(robot, node)
     least = RESOLVED * robot.cable_limit_mm
     if not high - low >= least:
         bounds = f"0 to {robot.cable_limit_mm:.6g} mm, by at least {least:.2g} mm"
-        raise ValueError(f"range is {low_mm} to {high_mm}; it must grow within {bounds}")
+        raise ValueError(f"the range from low_mm to high_mm is {low:.6g} to {high:.6g}; it must grow within {bounds}")
     cables = np.linspace(low, high, 101).tolist()
     tips = np.array([free_nodes(robot, cable)[node] for cable in cables])
     return np.asarray(np.polyfit(cables, tips, 1)[0])
@@ -131,6 +132,7 @@ def _check_node(robot: Robot, node: int) -> int:
     return check_whole("node", node, 0, robot.segments)
 
 
+@held_signals()
 def _segment(robot: Robot, cable_mm: float) -> _Segment:
     """Return the segment that all of the free robot's are, in the rod by Newton's method on the cable length."""
     cable_mm = _check_cable(robot, cable_mm)

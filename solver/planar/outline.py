@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.common.gap_laws import GapLaw, gap_function
 from solver.common.obstacle import SHARPEST
+from solver.common.signals import held_signals
 from solver.common.validation import Point
 from solver.planar.family import POSE_SIZE, Family
 from solver.planar.obstacles import directions, distance_to_outline
@@ -37,10 +38,12 @@ class Form:
         """Gap law of the family."""
         return GapLaw("custom", self.family, POSE_SIZE + len(self.sizes), (4,))
 
+    @held_signals()
     def values(self, points: np.ndarray) -> np.ndarray:
         """Return the family's function at points, ``(k, 2) → (k,)``."""
         return np.asarray(self.family.function(points.T, self.sizes)).ravel()
 
+    @held_signals()
     def derivatives(self, points: np.ndarray) -> np.ndarray:
         """Return the gap, its slopes and its second derivatives xx, xy, yy at points, ``(k, 2) → (6, k)``."""
         return np.asarray(gap_function(self.law)(points.T, (0.0, 0.0, 1.0, 0.0, 0.0, *self.sizes)))

@@ -26,6 +26,7 @@ from solver.common.ipopt import (
 )
 from solver.common.reference import write_contacts
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 from solver.planar.equilibrium import Equilibrium, touching_points
 from solver.planar.forces import onset_tension
@@ -134,6 +135,7 @@ class ReferenceSolver(CommandCheck):
         towards = (present.cable + part * (cable - present.cable), present.length + part * (length - present.length))
         return self._solve(present, *towards)
 
+    @held_signals()
     def _build(self) -> None:
         """Create the IPOPT solver, the slope of the Lagrangian in the cable displacement, and the bounds."""
         n = self.robot.segments
@@ -181,6 +183,7 @@ class ReferenceSolver(CommandCheck):
         unknowns = np.r_[self._shape(cable, length, np.zeros(self.robot.segments)), mounts]
         return self._balanced(cable, length, unknowns, np.zeros(self._touchable[:, :, 1:].size))
 
+    @held_signals()
     def _balanced(self, cable: float, length: float, unknowns: np.ndarray, multipliers: np.ndarray) -> _Point:
         """Return a shape with the multipliers of its inequalities, and those of the equalities by least squares."""
         derivatives = node_derivatives(self.robot, self.scene.laws, self.scene.mounted)
@@ -195,6 +198,7 @@ class ReferenceSolver(CommandCheck):
         unknowns, _, tensions, multipliers = equilibrium.node_solution()
         return _Point(equilibrium.cable_mm, equilibrium.length_mm, unknowns, -np.concatenate([tensions, multipliers]))
 
+    @held_signals()
     def _solve(self, start: _Point, cable: float, length: float) -> _Point | None:
         """Return the solution for another command, ``None`` where IPOPT does not converge or leaves the branch."""
         if cable < SLACK * self.robot.offset_mm:
@@ -242,6 +246,7 @@ class ReferenceSolver(CommandCheck):
                 present, low = point, middle
         return present
 
+    @held_signals()
     def _tension(self, point: _Point) -> float:
         """Return the cable tension, by the envelope theorem [N]."""
         slope = self._cable_slope(point.unknowns, self._parameters(point.cable, point.length), point.multipliers)

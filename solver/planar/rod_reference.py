@@ -5,6 +5,7 @@ import numpy as np
 from solver.common.reference import RodBranch, RodPoint, write_contacts, write_rod
 from solver.common.rod import bending_ratios
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 from solver.planar.equilibrium import Equilibrium, touching_points, unstressed_nodes
 from solver.planar.forces import onset_tension
@@ -23,6 +24,7 @@ class RodReference:
         touchable: Which points can touch which obstacle, ``(m, p, k)`` bool.
     """
 
+    @held_signals()
     def __init__(self, robot: Robot, scene: Scene, touchable: np.ndarray) -> None:
         self._robot, self._scene, self._touchable = robot, scene, touchable
         self._branch = RodBranch(robot, scene, node_problem(robot, scene.laws, scene.mounted), touchable)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.common.operations import dot
-from solver.common.validation import check_finite, check_instance
+from solver.common.validation import check_alike, check_finite, check_instance, check_numbers
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import sides
 
@@ -34,7 +34,13 @@ def with_friction(forces: np.ndarray, slopes: np.ndarray, friction: float) -> np
         forces: Normal forces, ``(..., 3)``.
         slopes: Slopes of the free tip's position in both displacements, ``(..., 2, 3)``.
         friction: Ratio μ of tangential to normal force.
+
+    Raises:
+        ValueError: If a value is no number, or an array not one of them of these shapes.
     """
+    forces, slopes = check_numbers("forces", forces, (..., 3)), check_numbers("slopes", slopes, (..., 2, 3))
+    check_alike(forces=forces.shape[:-1], slopes=slopes.shape[:-2])
+    friction = check_finite("friction", friction)
     size = _norm(forces)
     normal = forces / np.maximum(size, TINY)
     against = -dot(normal[..., None, :], slopes)  # how each displacement moves the tip into the surface
@@ -52,7 +58,13 @@ def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> n
         forces: Forces, ``(..., 3)``.
         loads: Loads of both pairs of cables, signed as their displacements, ``(..., 2)`` [N].
         slopes: Slopes of the free tip in both displacements, as :attr:`SpatialEquilibrium.tip_slopes`, ``(..., 2, 5)``.
+
+    Raises:
+        ValueError: If an array is not one of numbers of these shapes.
     """
+    forces, loads = check_numbers("forces", forces, (..., 3)), check_numbers("loads", loads, (..., 2))
+    slopes = check_numbers("slopes", slopes, (..., 2, 5))
+    check_alike(forces=forces.shape[:-1], loads=loads.shape[:-1], slopes=slopes.shape[:-2])
     works = dot(forces[..., None, :], slopes[..., :3])
     given = dot(loads[..., None, :], slopes[..., 3:])
     balance = dot(works, given)

@@ -14,6 +14,7 @@ import casadi as ca
 
 from solver.common.gap_laws import TINY, GapLaw, capsule_gap, circle_gap, half_plane_gap
 from solver.common.node_problem import NodeProblem, first_derivatives, norms, second_derivatives
+from solver.common.signals import held_signals
 from solver.spatial.obstacle_terms import MOTIONS, ObstacleSymbols, obstacle_terms, parameter_count
 from solver.spatial.robot import SpatialRobot
 from solver.spatial.rod_formulation import rod_node_problem
@@ -263,12 +264,14 @@ def _square_angles(disk: ca.MX, offset: float) -> ca.MX:
 
 
 @lru_cache(maxsize=32)
+@held_signals()
 def node_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Return the :func:`~solver.common.node_problem.first_derivatives` of :func:`node_problem`."""
     return first_derivatives(node_problem(robot, laws, mounted))
 
 
 @lru_cache(maxsize=32)
+@held_signals()
 def kkt_derivatives(robot: SpatialRobot, laws: tuple[GapLaw, ...], mounted: tuple[bool, ...]) -> ca.Function:
     """Return the :func:`~solver.common.node_problem.second_derivatives` of :func:`node_problem`."""
     change = ca.MX.sym("change", len(robot.cables) + 1 + MOTIONS * len(laws))

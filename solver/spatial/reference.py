@@ -11,6 +11,7 @@ from solver.common.geometry import touchable_points
 from solver.common.ipopt import LARGEST_STEP, MOVE_OFFSET, MOVE_SLOPE, OPTIONS, SLACK, SMALLEST_STEP, nlp_solver
 from solver.common.reference import write_contacts
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points
 from solver.spatial.formulation import node_problem
@@ -42,6 +43,7 @@ class SpatialReferenceSolver(SpatialCommandCheck):
         self._rest = self._rod.rest() if self._rod else self._paper_rest()
         check_rest(self._rest)
 
+    @held_signals()
     def _paper_rest(self) -> SpatialEquilibrium:
         problem = node_problem(self.robot, self.scene.laws, self.scene.mounted)
         self._equalities = problem.equalities.shape[0]
@@ -94,6 +96,7 @@ class SpatialReferenceSolver(SpatialCommandCheck):
                 return SpatialEquilibrium(self.robot, self.scene, equilibrium.block.copy(), Status.GAVE_UP, 0)
         return now
 
+    @held_signals()
     def _solve(self, start: SpatialEquilibrium, cables: np.ndarray) -> SpatialEquilibrium | None:
         """Return the solution for another command, ``None`` where IPOPT does not converge or leaves the branch."""
         free = self._free(cables)

@@ -19,7 +19,15 @@ from solver.common.robot import (
     widest_bend,
 )
 from solver.common.rod import Cable, Load, bending_ratios, check_rod, checked_rotations, full_cables
-from solver.common.validation import check_finite, check_number, check_sequence, check_whole, is_listed, refusal
+from solver.common.validation import (
+    check_finite,
+    check_number,
+    check_numbers,
+    check_sequence,
+    check_whole,
+    is_listed,
+    refusal,
+)
 
 LINES = ("backbone", "holes", "rim")
 TORSIONS = (0.01, 100.0)  # GJ over EI
@@ -28,8 +36,12 @@ LEAST_SINE = math.sin(math.radians(30) - 1e-9)  # of the angle between the cable
 
 
 def sides(cables_mm: np.ndarray) -> np.ndarray:
-    """Return which cable of each pair is pulled: 1 for the first one, −1 for the one opposite to it."""
-    return np.where(cables_mm < 0, -1.0, 1.0)
+    """Return which cable of each pair is pulled: 1 for the first one, −1 for the one opposite to it.
+
+    Raises:
+        ValueError: If the displacements are no numbers.
+    """
+    return np.where(check_numbers("cables_mm", cables_mm, (...,)) < 0, -1.0, 1.0)
 
 
 def stiffness_ratios(robot: "SpatialRobot") -> np.ndarray:

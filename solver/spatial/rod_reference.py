@@ -4,6 +4,7 @@ import numpy as np
 
 from solver.common.reference import RodBranch, RodPoint, write_contacts, write_rod
 from solver.common.scene import Scene
+from solver.common.signals import held_signals
 from solver.common.status import Status
 from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout, touching_points, unstressed_nodes
 from solver.spatial.formulation import node_problem
@@ -19,6 +20,7 @@ class SpatialRodReference:
         touchable: Which points can touch which obstacle, ``(m, p, k)`` bool.
     """
 
+    @held_signals()
     def __init__(self, robot: SpatialRobot, scene: Scene, touchable: np.ndarray) -> None:
         self._robot, self._scene, self._touchable = robot, scene, touchable
         self._branch = RodBranch(robot, scene, node_problem(robot, scene.laws, scene.mounted), touchable)

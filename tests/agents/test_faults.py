@@ -179,6 +179,20 @@ def test_evaluating_on_a_full_disk_leaves_nothing_half_written(tmp_path):
     assert [path for path in out.rglob("*") if path.is_file()] == []
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("evaluate --policies PI --no-video --out", "worker processes cannot be started: File too large"),
+        ("retrain --out", "worker processes cannot be started: File too large"),
+        ("train --run", "config.json cannot be written: File too large"),
+        ("sweep --trials 1 --out", "out"),
+    ],
+)
+def test_a_disk_that_takes_nothing_is_named(arguments, words, tmp_path):
+    code, lines = ended(started(*arguments.split(), tmp_path / "out", preexec_fn=limited(0)), timeout=240)
+    assert_one_line(code, lines[-1:], words)
+
+
 def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
     path = tmp_path / "file.txt"
     write_text(path, "before")

@@ -72,7 +72,7 @@ BAD_RESETS = [
     ({"seed": 5, "options": [1]}, "options is"),
     ({"seed": 5, "options": []}, "options is"),
     ({"seed": 5, "options": 0}, "options is 0"),
-    ({"seed": 5, "options": {"scene": [1], "desired_force": 0.1}}, "1 is not an obstacle"),
+    ({"seed": 5, "options": {"scene": [1], "desired_force": 0.1}}, "an entry of obstacles is 1"),
     ({"seed": 5, "options": {"scene": None, "desired_force": 0.1}}, "scene is None; it must be a Scene"),
     *(
         ({"seed": 5, "options": {"scene": scene_of(PUSH), "desired_force": force}}, "desired_force is")

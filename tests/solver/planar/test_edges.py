@@ -59,10 +59,13 @@ def test_a_circle_at_the_tip_is_rolled_over_and_not_passed_through(increment):
 # A step costs the same whatever the radius of a corner.
 
 
-def triangle(radius):
+def triangle(radius, model="paper"):
     """The prototype before a triangle with corners of a radius [mm]; None where that is refused."""
     try:
-        return Solver(Robot.prototype(model="paper"), Scene([Polygon(corners=TRIANGLE, radius=radius)]))
+        return Solver(
+            Robot.prototype(model=model, between=2 if model == "rod" else 0),
+            Scene([Polygon(corners=TRIANGLE, radius=radius)]),
+        )
     except ValueError:
         return None
 
@@ -72,8 +75,12 @@ def trace(solver):
     return solver.trace(solver.rest(), 12.0).nodes
 
 
-def test_a_sharp_corner_costs_no_more_than_a_round_one():
-    solvers = [triangle(10.0**-power) for power in range(1, 16)]
+MODELS = pytest.mark.parametrize("model", ["paper", "rod"])
+
+
+@MODELS
+def test_a_sharp_corner_costs_no_more_than_a_round_one(model):
+    solvers = [triangle(10.0**-power, model) for power in range(1, 16)]
     assert None in solvers
     round_one, sharp_one = solvers[0], solvers[solvers.index(None) - 1]
     assert sharp_one.step(sharp_one.rest(), 12.0).status is Status.CONVERGED
@@ -81,15 +88,17 @@ def test_a_sharp_corner_costs_no_more_than_a_round_one():
     assert cost(sharp_one, 12.0) <= 3 * cost(round_one, 12.0)
 
 
+@MODELS
 @pytest.mark.parametrize("radius", [1e-3, 1e-4])
-def test_a_corner_costs_no_more_than_a_round_one(radius):
-    assert cost(triangle(radius), 12.0) <= 3 * cost(triangle(0.1), 12.0)
+def test_a_corner_costs_no_more_than_a_round_one(radius, model):
+    assert cost(triangle(radius, model), 12.0) <= 3 * cost(triangle(0.1, model), 12.0)
 
 
-def test_the_end_of_a_long_ellipse_costs_no_more_than_that_of_a_short_one():
+@MODELS
+def test_the_end_of_a_long_ellipse_costs_no_more_than_that_of_a_short_one(model):
     short, long = (Scene([Ellipse(center=(55, 90), radii=(half, 10), axis=(0, 1))]) for half in (1e2, 1e4))
     short_one, long_one = (
-        cost(Solver(Robot.prototype(model="paper"), scene), 12.0, repeats=8) for scene in (short, long)
+        cost(Solver(Robot.prototype(model=model), scene), 12.0, repeats=8) for scene in (short, long)
     )
     assert long_one <= 3 * short_one
 

@@ -43,7 +43,7 @@ def test_fitted_slopes_lie_between_and_tend_to_the_exact_ones(model):
     assert np.all((np.minimum(low, high) <= fitted) & (fitted <= np.maximum(low, high)))
     assert fitted_slopes(robot, 3.999, 4.001) == pytest.approx(tip_slopes(robot, 4.0), rel=1e-6)
     assert fitted_slopes(robot, 3.999, 4.001, node=9) == pytest.approx(tip_slopes(robot, 4.0, node=9), rel=1e-6)
-    with pytest.raises(ValueError, match="range is 5 to 2"):
+    with pytest.raises(ValueError, match="range from low_mm to high_mm is 5 to 2"):
         fitted_slopes(robot, 5, 2)
 
 
