@@ -192,10 +192,25 @@ Optimality ModelContinuation<Model>::optimality(const double* block) {
   return found;
 }
 
+template <class Model>
+void ModelContinuation<Model>::record_shape() {
+  points_ = problem_.points();
+  mounts_ = present_.mounts;
+  if (!shapes_) return;
+  for (const auto& s : problem_.states()) shapes_->insert(shapes_->end(), s.v.begin(), s.v.begin() + 3);
+  for (const Position& point : points_) shapes_->insert(shapes_->end(), point.v.begin(), point.v.end());
+  for (std::size_t j = 0; j < problem_.obstacles().size(); ++j) {
+    const int mount = problem_.mount_of(static_cast<int>(j));
+    const Position moved = mount < 0 ? Position{} : mounts_[mount];
+    shapes_->insert(shapes_->end(), moved.v.begin(), moved.v.end());
+  }
+}
+
 #define CCR_INSTANTIATE(Model)                                             \
   template Optimality ModelContinuation<Model>::optimality(const double*); \
   template void ModelContinuation<Model>::read_block(const double*);       \
-  template void ModelContinuation<Model>::write_block(double*);
+  template void ModelContinuation<Model>::write_block(double*);            \
+  template void ModelContinuation<Model>::record_shape();
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

@@ -81,20 +81,6 @@ void ModelContinuation<Model>::set_obstacles(std::span<const Obstacle<kSpace>> o
   trial_ = present_;
 }
 
-template <class Model>
-void ModelContinuation<Model>::record_shape() {
-  points_ = problem_.points();
-  mounts_ = present_.mounts;
-  if (!shapes_) return;
-  for (const auto& s : problem_.states()) shapes_->insert(shapes_->end(), s.v.begin(), s.v.begin() + 3);
-  for (const Position& point : points_) shapes_->insert(shapes_->end(), point.v.begin(), point.v.end());
-  for (std::size_t j = 0; j < problem_.obstacles().size(); ++j) {
-    const int mount = problem_.mount_of(static_cast<int>(j));
-    const Position moved = mount < 0 ? Position{} : mounts_[mount];
-    shapes_->insert(shapes_->end(), moved.v.begin(), moved.v.end());
-  }
-}
-
 // Makes `trial_`, at which the problem is evaluated, the present equilibrium.
 template <class Model>
 void ModelContinuation<Model>::accept() {
@@ -334,8 +320,7 @@ StepResult ModelContinuation<Model>::trace(const double* from, const double* tar
   template StepResult ModelContinuation<Model>::follow(const double*, const double*, double*); \
   template void ModelContinuation<Model>::evaluate_present();                                  \
   template StepResult ModelContinuation<Model>::finish(const Command&, double*);               \
-  template void ModelContinuation<Model>::accept();                                            \
-  template void ModelContinuation<Model>::record_shape();
+  template void ModelContinuation<Model>::accept();
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 
