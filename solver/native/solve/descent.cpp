@@ -25,7 +25,7 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   }
   descent_points_ = points_;
   descent_mounts_ = mounts_;
-  descent_trace_ = shapes_ ? shapes_->size() : 0;
+  descent_trace_ = recorded();
   present_evaluated_ = false;
   problem_.enable_barrier(true);
   bool moved = newton_.set_metric(present_) && leave_towards(command), folded = false;
@@ -61,7 +61,7 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
       over_limit_ = tensions_;
       return undo_descent(End::kOverTension);
     }
-    if (held) keep_last_held(descent_start_);
+    if (held) keep_last_held(descent_start_, descent_trace_);
   }
   if (problem_.keeps_tensions()) follow_lengths(present_.command);
   double farthest = 0;

@@ -86,7 +86,7 @@ template <class Model>
 void ModelContinuation<Model>::accept() {
   update_trend();
   const double limit = problem_.robot().max_tension;
-  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) keep_last_held(present_);
+  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) keep_last_held(present_, recorded());
   if (problem_.keeps_tensions()) follow_lengths(trial_.command);
   keep_before_contact(trial_);
   std::swap(present_, trial_);
@@ -287,6 +287,7 @@ StepResult ModelContinuation<Model>::finish(const Command& start, double* to) {
     present_ = last_held_;
     present_evaluated_ = false;
     evaluate_present();
+    if (shapes_) shapes_->resize(last_held_trace_);
     record_shape();
   }
   if (!problem_.touches_obstacle(present_.active)) {

@@ -146,7 +146,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool is_blocked(const Command& command);
   bool closes(const ActiveSet& holding, const Command& command);
   bool find_holding_set(const Command& command, ActiveSet& holding);
-  void keep_last_held(const Iterate& held);
+  std::size_t recorded() const { return shapes_ ? shapes_->size() : 0; }
+  void keep_last_held(const Iterate& held, std::size_t recorded);
 
   // Motors at the limit that keep their tension.
   double highest_held(const Tensions& tensions) const;
@@ -215,9 +216,10 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool began_in_contact_ = false;           // whether an obstacle was touched where the step began
   Iterate before_contact_;                  // the last equilibrium of the step that touched nothing,
   Command at_contact_{};                    // and a command under which the robot touches
-  Iterate last_held_;          // the last equilibrium of the step that the motors held, where a later one was not
-  bool was_exceeded_ = false;  // whether there is one
-  bool met_slack_ = false;     // whether something met the robot of the paper's model while its cables were slack
+  Iterate last_held_;                // the last equilibrium of the step that the motors held, where a later one was not
+  std::size_t last_held_trace_ = 0;  // shapes recorded then
+  bool was_exceeded_ = false;        // whether there is one
+  bool met_slack_ = false;           // whether something met the robot of the paper's model while its cables were slack
 
   std::vector<Position> nodes_;  // of the block last read
   std::vector<Frame> frames_;
