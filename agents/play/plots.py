@@ -42,6 +42,11 @@ class Plots:
             residual = float(np.log10(max(numbers.residual, LEAST_RESIDUAL)))
             self._rows.append((float(numbers.step), *forces, residual, *numbers.tensions))
 
+    def remove(self) -> None:
+        """Remove the charts."""
+        for chart in self._charts:
+            chart.remove()
+
     def draw(self) -> None:
         """Send what was noted to the page."""
         if len(self._rows) < 2:

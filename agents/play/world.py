@@ -143,7 +143,7 @@ class World:
 
     def _show_contacts(self, contacts: Contacts) -> None:
         shown = np.argsort(-contacts.levels)[:MARKERS]
-        positions, scales = np.zeros((MARKERS, 3)), np.full(MARKERS, 1e-6)
+        positions, scales = np.zeros((MARKERS, 3), np.float32), np.full(MARKERS, 1e-6, np.float32)
         colors = np.zeros((MARKERS, 3), np.uint8)
         positions[: len(shown)], scales[: len(shown)] = contacts.points[shown], 1.0
         colors[: len(shown)] = contact_colors(contacts.levels[shown])
@@ -184,7 +184,7 @@ def _grid(planar: bool) -> np.ndarray:
     Lines are drawn much faster than the grid of the library, which shades every pixel.
     """
     at, end = np.arange(-10, 11) / 10, np.ones(21)
-    across = np.stack([np.stack([at, -end], axis=-1), np.stack([at, end], axis=-1)], axis=1)
+    across: np.ndarray = np.stack([np.stack([at, -end], axis=-1), np.stack([at, end], axis=-1)], axis=1)
     flat = np.concatenate([across, across[..., ::-1]])
     if not planar:
         return np.concatenate([flat, np.zeros((*flat.shape[:2], 1))], axis=-1)
