@@ -110,7 +110,7 @@ class World:
         self._markers = self._scene.add_batched_meshes_simple(
             "/contacts", *ball, np.tile([1.0, 0, 0, 0], (MARKERS, 1)), none, batched_scales=np.full(MARKERS, 1e-6),
             batched_colors=np.zeros((MARKERS, 3), np.uint8), lod="off", cast_shadow=False, position=before,
-            visible=False,
+            visible=False, material="toon5",
         )  # fmt: skip
         self._arrows = [
             self._scene.add_arrows(
@@ -124,7 +124,7 @@ class World:
         wall = isinstance(obstacle, HalfPlane) or not np.isfinite(obstacle.extent.radius)
         return self._scene.add_mesh_simple(
             f"/obstacles/{index}", *mesh_of(obstacle, self._length_mm), color=OBSTACLE, flat_shading=wall,
-            position=middle_of(obstacle, self._length_mm), side="double", cast_shadow=False,
+            position=middle_of(obstacle, self._length_mm), side="double", cast_shadow=False, material="toon5",
         )  # fmt: skip
 
     def _add_handle(self, index: int, obstacle: Obstacle, dragged: Dragged) -> viser.TransformControlsHandle:
