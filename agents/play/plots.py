@@ -42,17 +42,23 @@ class Plots:
             residual = float(np.log10(max(numbers.residual, LEAST_RESIDUAL)))
             self._rows.append((float(numbers.step), *forces, residual, *numbers.tensions))
 
+    def remove(self) -> None:
+        """Remove the charts."""
+        for chart in self._charts:
+            chart.remove()
+
     def draw(self) -> None:
         """Send what was noted to the page."""
         if len(self._rows) < 2:
             return
         rows = np.array(self._rows).T
         for chart, columns in zip(self._charts, self._columns, strict=True):
-            chart.data = (rows[0], *rows[columns])
+            chart.data = (rows[0] - rows[0, -1], *rows[columns])
 
 
 def _chart(gui: viser.GuiApi, title: str, series: list[tuple[str, str]]) -> viser.GuiUplotHandle:
-    empty = (np.arange(2.0), *(np.zeros(2) for _ in series))  # uPlot never returns from a range of no length
-    described = (uplot.Series(label="step"), *(uplot.Series(label=n, stroke=c, width=2) for n, c in series))
-    scales = {"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)}
+    empty = (np.array([-1.0, 0.0]), *(np.zeros(2) for _ in series))  # uPlot never returns from a range of no length
+    described = (uplot.Series(label="steps ago"), *(uplot.Series(label=n, stroke=c, width=2) for n, c in series))
+    # A range that stays: viser carries that of the last data over to the next, and may miss the data.
+    scales = {"x": uplot.Scale(time=False, range=(-SHOWN_STEPS, 0.0)), "y": uplot.Scale(auto=True)}
     return gui.add_uplot(empty, described, title=title, scales=scales, height=190)

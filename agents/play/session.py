@@ -43,7 +43,8 @@ class Session:
         self.choices, self.generation, self.faults = choices, 0, 0
         self.episodes = self.paused = False
         self._seed, self._ticks, self._message, self._shown_until = seed, 0, "", 0
-        self._begin(choices, choices.make_env(), choices.make_policy())
+        self._env = choices.make_env()
+        self._begin(choices, self._env, choices.make_policy())
 
     @property
     def env(self) -> ContactEnv:
@@ -131,6 +132,10 @@ class Session:
             self._recover()
             return self._frame()
 
+    def pause(self) -> None:
+        """Let time stand still, or go on."""
+        self.paused = not self.paused
+
     def say(self, message: str) -> None:
         """Show a message for a while."""
         self._message, self._shown_until = message, self._ticks + MESSAGE_TICKS
@@ -157,7 +162,7 @@ class Session:
     def _begin(self, choices: Choices, env: Environment, policy: Policy | None) -> None:
         """Put an environment in the place of the present one, once it has been reset."""
         observation, info = env.reset(seed=self._seed)
-        if self.generation:
+        if env is not self._env:
             self._env.close()
         self._env, self.choices, self._policy = env, choices, policy
         self.generation += 1
@@ -186,14 +191,15 @@ class Session:
 
     def _pull(self, index: int, target_mm: float) -> None:
         spec = self.env.action_spec
+        if not 0 <= index < spec.size:
+            raise ValueError(f"coordinate {index} is out of range; the robot has {spec.size}")
         if self._policy is not None:
             self._drive(self.choices.changed("driver", "Hand"), None)
         self._targets_mm[index] = np.clip(target_mm, spec.low_mm[index], spec.high_mm[index])
 
     def _move_obstacles(self) -> None:
         """Move the obstacles part of their way; where the robot stops them, they stay."""
-        scene = self.equilibrium.scene
-        wanted = self._dragging.next_scene(scene)
+        wanted = self._dragging.next_scene(self.equilibrium.scene) if self._dragging.active else None
         if wanted is None:
             return
         try:
@@ -228,7 +234,8 @@ class Session:
                 self._drive(self.choices.changed("driver", "Hand"), None)
                 self.say(f"{name} cannot drive this robot: {error}")
         missing = self._targets_mm - self.env.privileged_state.motor_mm
-        return np.clip(missing / self.env.action_spec.increment_mm, -1.0, 1.0).astype(np.float32)
+        action: np.ndarray = np.clip(missing / self.env.action_spec.increment_mm, -1.0, 1.0)
+        return action.astype(np.float32)
 
     def _recover(self) -> None:
         """Begin a new scene after an error that should not be, with what was played if that still works."""
@@ -248,10 +255,10 @@ class Session:
             self._certify()
         contacts = contacts_of(equilibrium, info["force_true"], info["force_est"], scales)
         now, resting = equilibrium.scene_now.obstacles, equilibrium.scene.obstacles
-        return Frame(shape_of(equilibrium, scales), now, resting, contacts, self._numbers())
+        return Frame(shape_of(equilibrium, scales), now, resting, contacts, self._numbers(equilibrium))
 
-    def _numbers(self) -> Numbers:
-        equilibrium, info = self.equilibrium, self._info
+    def _numbers(self, equilibrium: AnyEquilibrium) -> Numbers:
+        info = self._info
         true, estimate = (float(np.linalg.norm(info[name])) for name in ("force_true", "force_est"))
         return Numbers(
             step=self._steps,

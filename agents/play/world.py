@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from agents.play.frame import Contacts, Frame
-from agents.play.meshes import disk, mesh_of, middle_of, sizes_of
+from agents.play.meshes import disk, grid, mesh_of, middle_of, sizes_of
 from solver import HalfPlane, Obstacle
 
 Color = tuple[int, int, int]
@@ -24,7 +24,7 @@ FORCE_TRUE: Color = (0, 140, 126)
 FORCE_EST: Color = (244, 146, 30)
 CONTACT = np.array([(252, 150, 166), (208, 24, 66), (98, 0, 30)], float)  # from a small multiplier to a large one
 
-MARKERS = 24  # contact points that are shown at most
+MARKERS = 16  # contact points that are shown at most
 MARKER, THICK, THIN = 0.016, 0.016, 0.006  # radius of a marker, thickness of backbone and cables [L]
 BEFORE = -0.075  # where contacts and arrows of the plane are shown, before obstacles [L]
 FLAT = 0.18  # of the disks of a planar robot across the plane, over their radius
@@ -86,7 +86,9 @@ class World:
 
     def _add_ground(self, radius: float) -> None:
         self._scene.add_light_ambient("/ambient", intensity=1.6)
-        self._scene.add_line_segments("/grid", _grid(self._planar), GRID, thickness=1.0, thickness_units="screen")
+        self._scene.add_mesh_simple(
+            "/grid", *grid(self._planar), color=GRID, material="toon3", side="double", cast_shadow=False
+        )
         self._scene.add_box("/clamp", CLAMP, dimensions=(3.2 * radius, 3.2 * radius, 0.04), position=(0, 0, -0.02))
 
     def _add_robot(self, frame: Frame, radius: float) -> None:
@@ -98,7 +100,7 @@ class World:
         mesh = disk(radius, min(0.012, 0.25 / len(shape.nodes)))
         self._disks = self._scene.add_batched_meshes_simple(
             "/robot/disks", *mesh, shape.disks, shape.nodes, batched_colors=DISK, lod="off",
-            batched_scales=np.tile([1.0, FLAT if self._planar else 1.0, 1.0], (len(shape.nodes), 1)), side="double",
+            batched_scales=np.tile([1.0, FLAT if self._planar else 1.0, 1.0], (len(shape.nodes), 1)), material="toon5",
             cast_shadow=False,
         )  # fmt: skip
 
@@ -108,6 +110,7 @@ class World:
         self._markers = self._scene.add_batched_meshes_simple(
             "/contacts", *ball, np.tile([1.0, 0, 0, 0], (MARKERS, 1)), none, batched_scales=np.full(MARKERS, 1e-6),
             batched_colors=np.zeros((MARKERS, 3), np.uint8), lod="off", cast_shadow=False, position=before,
+            visible=False, material="toon5",
         )  # fmt: skip
         self._arrows = [
             self._scene.add_arrows(
@@ -121,7 +124,7 @@ class World:
         wall = isinstance(obstacle, HalfPlane) or not np.isfinite(obstacle.extent.radius)
         return self._scene.add_mesh_simple(
             f"/obstacles/{index}", *mesh_of(obstacle, self._length_mm), color=OBSTACLE, flat_shading=wall,
-            position=middle_of(obstacle, self._length_mm), side="double", cast_shadow=False,
+            position=middle_of(obstacle, self._length_mm), side="double", cast_shadow=False, material="toon5",
         )  # fmt: skip
 
     def _add_handle(self, index: int, obstacle: Obstacle, dragged: Dragged) -> viser.TransformControlsHandle:
@@ -142,19 +145,23 @@ class World:
         return handle
 
     def _show_contacts(self, contacts: Contacts) -> None:
+        if len(contacts.points):
+            self._place_markers(contacts)
+        _set_visible(self._markers, bool(len(contacts.points)))
+        for arrow, ends in zip(self._arrows, (contacts.arrow_true, contacts.arrow_est), strict=True):
+            visible = bool((ends[0] != ends[1]).any())
+            if visible:
+                arrow.points = ends[None]
+            _set_visible(arrow, visible)
+
+    def _place_markers(self, contacts: Contacts) -> None:
         shown = np.argsort(-contacts.levels)[:MARKERS]
-        positions, scales = np.zeros((MARKERS, 3)), np.full(MARKERS, 1e-6)
+        positions, scales = np.zeros((MARKERS, 3), np.float32), np.full(MARKERS, 1e-6, np.float32)
         colors = np.zeros((MARKERS, 3), np.uint8)
         positions[: len(shown)], scales[: len(shown)] = contacts.points[shown], 1.0
         colors[: len(shown)] = contact_colors(contacts.levels[shown])
         self._markers.batched_positions, self._markers.batched_scales = positions, scales
         self._markers.batched_colors = colors
-        for arrow, ends in zip(self._arrows, (contacts.arrow_true, contacts.arrow_est), strict=True):
-            visible = bool((ends[0] != ends[1]).any())
-            if visible:
-                arrow.points = ends[None]
-            if arrow.visible != visible:
-                arrow.visible = visible
 
     def _show_obstacle(self, index: int, obstacle: Obstacle, touched: bool) -> None:
         mesh, sizes = self._meshes[index], sizes_of(obstacle)
@@ -172,28 +179,20 @@ class World:
             handle.position = middle
 
 
+def _set_visible(handle: viser.SceneNodeHandle, visible: bool) -> None:
+    if handle.visible != visible:
+        handle.visible = visible
+
+
 def contact_colors(levels: np.ndarray) -> np.ndarray:
     """Return the colour of contacts, darker the larger their multiplier, ``(k, 3)`` uint8."""
     shade = np.clip(2 * levels, 0.0, 2.0)
     return np.stack([np.interp(shade, range(3), channel) for channel in CONTACT.T], axis=-1).astype(np.uint8)
 
 
-def _grid(planar: bool) -> np.ndarray:
-    """Return a square grid a tenth of the length wide, behind the robot or below it, ``(k, 2, 3)``.
-
-    Lines are drawn much faster than the grid of the library, which shades every pixel.
-    """
-    at, end = np.arange(-10, 11) / 10, np.ones(21)
-    across = np.stack([np.stack([at, -end], axis=-1), np.stack([at, end], axis=-1)], axis=1)
-    flat = np.concatenate([across, across[..., ::-1]])
-    if not planar:
-        return np.concatenate([flat, np.zeros((*flat.shape[:2], 1))], axis=-1)
-    return np.stack([flat[..., 0], np.full(flat.shape[:2], 0.3), 0.4 + flat[..., 1]], axis=-1)
-
-
 def _ball() -> tuple[np.ndarray, np.ndarray]:
     """Return vertices and faces of a marker: a sphere of rings."""
-    rings, around = 8, 12
+    rings, around = 6, 10
     polar, angles = np.linspace(0, np.pi, rings + 1)[:, None], np.linspace(0, 2 * np.pi, around, endpoint=False)
     points = [np.sin(polar) * np.cos(angles), np.sin(polar) * np.sin(angles), np.cos(polar) * np.ones(around)]
     index = np.arange((rings + 1) * around).reshape(rings + 1, around)

@@ -1,7 +1,7 @@
 """``ccr-gym play`` in a real browser: Debian's Chromium, driven by Playwright; run by ``make browser``.
 
-It says how many updates a second reach the page while a policy drives, beside the frame rate of an empty page in the
-same run: without a GPU, and on a busy machine, a browser draws either slowly.
+It says how many updates a second reach the page while a policy drives, and for how many the scene is drawn, beside
+the frame rate of an empty page in the same run: without a GPU, and on a busy machine, a browser draws slowly.
 """
 
 import io
@@ -26,23 +26,29 @@ pytestmark = pytest.mark.skipif(not CHROMIUM, reason="needs chromium: apt-get in
 SHOTS = Path("build/browser")
 PATIENCE_MS = 180_000
 UPDATES = 30.0  # asked of the page, less in proportion where even an empty page is not drawn FULL times a second
+DRAWN = 15.0  # frames with a new shape, drawn without a GPU; a busy machine of two cores draws 23 to 27
 FULL = 60.0
 COUNT_FRAMES = """() => new Promise(done => {
   let count = 0; const start = performance.now();
   const frame = () => { count++; const time = performance.now() - start;
     time > 5000 ? done(1000 * count / time) : requestAnimationFrame(frame) };
   requestAnimationFrame(frame) })"""
-COUNT_UPDATES = """() => new Promise(done => {
-  const seen = new Set(), start = performance.now();
-  const look = () => { seen.add(document.querySelector('#ccr-status').dataset.tick);
+NOTE_UPLOADS = """for (const name of ['bufferData', 'bufferSubData']) {
+  const upload = WebGL2RenderingContext.prototype[name];
+  WebGL2RenderingContext.prototype[name] = function (...data) {
+    window.uploads = (window.uploads || 0) + 1; return upload.apply(this, data) } }"""
+COUNT_DRAWN = """() => new Promise(done => {  // frames for which the scene got new points
+  let count = 0, last = window.uploads; const start = performance.now();
+  const frame = () => { if (window.uploads !== last) { count++; last = window.uploads }
     const time = performance.now() - start;
-    time > 8000 ? done(1000 * seen.size / time) : setTimeout(look, 4) };
-  look() })"""
+    time > 8000 ? done(1000 * count / time) : requestAnimationFrame(frame) };
+  requestAnimationFrame(frame) })"""
 
 
 @pytest.fixture(scope="module")
-def url():
-    command = [sys.executable, "-m", "agents.cli", "play", "--no-open", "--port", "8471"]
+def url(tmp_path_factory):
+    folder = str(tmp_path_factory.mktemp("play"))
+    command = [sys.executable, "-m", "agents.cli", "play", "--no-open", "--port", "8471", "--out", folder]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     lines: queue.Queue[str] = queue.Queue()
     reader = threading.Thread(target=lambda: [lines.put(line) for line in server.stdout], daemon=True)
@@ -53,6 +59,7 @@ def url():
     server.send_signal(2)
     assert server.wait(60) == 0
     reader.join()
+    assert list(lines.queue) == ["Play has ended\n"]
     server.stdout.close()
 
 
@@ -69,6 +76,7 @@ def browser():
 def page(browser, url):
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.set_default_timeout(PATIENCE_MS)
+    page.add_init_script(NOTE_UPLOADS)
     page.errors, page.outside = [], []
     page.on("console", lambda message: page.errors.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: page.errors.append(str(error)))
@@ -142,23 +150,71 @@ def cpu_seconds():
     return server, browser
 
 
-def test_updates_a_second_with_a_policy(page, browser, url, capsys):
-    page.keyboard.press("n")
-    page.get_by_label("Driver").first.click()
-    page.get_by_role("option", name="MPC").click()
+def choose(page, label, option):
+    page.get_by_label(label, exact=True).first.click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def test_a_recording_is_downloaded(page):
+    page.keyboard.press("g")
+    page.keyboard.press("k")
+    page.wait_for_timeout(2000)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Stop recording").click()
+    assert download.value.suggested_filename == "play-000.gif"
+    assert len(imageio.mimread(download.value.path())) > 5
+
+
+def test_space_pauses_whatever_has_the_focus(page):
+    page.get_by_role("button", name="New", exact=True).click()
+    page.wait_for_timeout(1000)
+    page.keyboard.press("Space")
+    page.wait_for_timeout(1000)
+    step = page.inner_text("#ccr-status tr")
+    page.wait_for_timeout(1500)
+    assert page.inner_text("#ccr-status tr") == step
+    page.keyboard.press("Space")
+    page.wait_for_timeout(1500)
+    assert page.inner_text("#ccr-status tr") != step
+
+
+def test_settings_keep_their_tab(page):
+    page.get_by_role("tab", name="Setting").click()
+    choose(page, "Model", "paper")
+    page.wait_for_timeout(2000)
+    choose(page, "Task", "CCR/LoadCell-v1")
     page.wait_for_timeout(3000)
-    before, first = cpu_seconds(), status(page, "tick")
-    updates = page.evaluate(COUNT_UPDATES)
-    used = [1e3 * (b - a) / (status(page, "tick") - first) for a, b in zip(before, cpu_seconds(), strict=True)]
+    assert page.get_by_label("Model", exact=True).first.input_value() == "rod"
+    choose(page, "Task", "CCR/PushObstacle-v1")
+    choose(page, "Sensing", "realistic")
+    page.wait_for_timeout(2000)
+    page.get_by_role("tab", name="Drive").click()
+    assert force(page) == 0
+
+
+def test_updates_a_second_with_a_policy(page, browser, url, capsys):
+    page.get_by_role("tab", name="Setting").click()
+    choose(page, "Task", "CCR/MovingObstacle-v1")  # where the robot never comes to rest
+    choose(page, "Sensing", "ideal")
+    page.wait_for_timeout(2000)
+    page.get_by_role("tab", name="Drive").click()
+    choose(page, "Driver", "MPC")
+    page.wait_for_timeout(3000)
+    before, first, start = cpu_seconds(), status(page, "tick"), time.perf_counter()
+    drawn = page.evaluate(COUNT_DRAWN)
+    ticks, seconds = status(page, "tick") - first, time.perf_counter() - start
+    used = [1e3 * (b - a) / ticks for a, b in zip(before, cpu_seconds(), strict=True)]
     shoot(page, "policy.png")
     empty = browser.new_page(viewport={"width": 1280, "height": 800})
     empty.goto("about:blank")
     frames = empty.evaluate(COUNT_FRAMES)
     empty.close()
     with capsys.disabled():
-        print(f"\n{updates:.1f} updates/s with MPC driving; an empty page is drawn {frames:.1f} times a second")
-        print(f"CPU per update: {used[0]:.1f} ms in the server, {used[1]:.1f} ms in the browser, without a GPU")
-    assert updates >= UPDATES * min(1.0, frames / FULL)
+        print(f"\n{ticks / seconds:.1f} updates/s reach the page with MPC driving, {drawn:.1f}/s are drawn;", end=" ")
+        print(f"an empty page is drawn {frames:.1f} times a second")
+        print(f"CPU per tick: {used[0]:.1f} ms in the server, {used[1]:.1f} ms in the browser, without a GPU")
+    assert ticks / seconds >= UPDATES * min(1.0, frames / FULL)
+    assert drawn >= DRAWN * min(1.0, frames / FULL)
 
 
 def test_no_error_and_nothing_from_elsewhere(page):

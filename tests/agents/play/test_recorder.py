@@ -17,6 +17,13 @@ def test_a_recording_is_a_gif_of_pictures(tmp_path):
             recorder.add(session.picture())
         paths.append(recorder.stop())
     assert [path.name for path in paths] == ["play-000.gif", "play-001.gif"]
-    assert len(imageio.mimread(paths[0])) >= 1
+    assert len(imageio.mimread(paths[0])) == 3
     assert imageio.imread(paths[0]).shape[:2] == session.picture().shape[:2]
     assert recorder.stop() is None
+
+
+def test_a_recording_without_pictures_leaves_no_file(tmp_path):
+    recorder = Recorder(tmp_path)
+    recorder.start()
+    assert recorder.stop() is None
+    assert not list(tmp_path.iterdir())

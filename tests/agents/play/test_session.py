@@ -100,6 +100,7 @@ def test_wrong_inputs_are_refused_with_a_message():
         lambda: session.drag(7, (0.0, 0.0)),
         lambda: session.drag(0, (float("nan"), 0.0)),
         lambda: session.resize(0, 50.0),
+        lambda: session.pull(3, 1.0),
     ):
         session.say("")
         act()
