@@ -1,4 +1,8 @@
-"""Write ``demo.gif``: a policy that comes with the package tracks a force on a test scene, with realistic sensing."""
+"""Write ``demo.gif`` and ``thumbnails/``.
+
+In the animation a policy that comes with the package tracks a force on a test scene, with realistic sensing. A
+thumbnail shows the robot of an environment after some steps of the oracle.
+"""
 
 from pathlib import Path
 
@@ -6,16 +10,30 @@ import gymnasium
 import numpy as np
 from PIL import Image
 
-import ccr_gym  # noqa: F401 - registers the ids
-from agents import LearnedPolicy, trained
+import ccr_gym
+from agents import LearnedPolicy, NewtonController, trained
 
 ENV_ID, LEARNER, SEED = "CCR/TrackForce-v1", "Distilled", 2
 COLOURS = 256  # fewer lose the red of contacts and of the tension limit
 FRAME_MS, LAST_MS = 50, 1500  # how long each picture is shown, and the last one
 PATH = Path(__file__).with_name("demo.gif")
+THUMBNAILS = Path(__file__).with_name("thumbnails")
+THUMBNAIL_SEED, STEPS = 3, 40
+SCENE = 0.09, 0.72, 0.83  # top, bottom and right end of the robot among its obstacles, as parts of a picture
+WIDTH = 220
 
 
 def main() -> None:
+    """Write all pictures."""
+    write_demo()
+    THUMBNAILS.mkdir(exist_ok=True)
+    for env_id in ccr_gym.ENV_IDS:
+        path = THUMBNAILS / f"{env_id.split('/')[1]}.png"
+        thumbnail(env_id).save(path, optimize=True)
+        print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
+
+
+def write_demo() -> None:
     """Record an episode and write it, with one palette for all pictures."""
     frames = [Image.fromarray(frame) for frame in episode()]
     palette = frames[-1].quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
@@ -36,6 +54,23 @@ def episode() -> list[np.ndarray]:
         observation, _, _, ended, _ = env.step(policy.act(observation))
         frames.append(env.render())
     return frames
+
+
+def thumbnail(env_id: str) -> Image.Image:
+    """Return a small picture of the robot among its obstacles."""
+    env = gymnasium.make(env_id, render_mode="rgb_array", obs_mode="dict")
+    policy = NewtonController.knowing()
+    observation, _ = env.reset(seed=THUMBNAIL_SEED)
+    policy.reset(env)
+    for _ in range(STEPS):
+        observation, *_ = env.step(policy.act(observation))
+    picture = Image.fromarray(env.render())
+    top, bottom, right = (
+        round(part * size) for part, size in zip(SCENE, (picture.height, picture.height, picture.width), strict=True)
+    )
+    scene = picture.crop((0, top, right, bottom))
+    small = scene.resize((WIDTH, round(WIDTH * scene.height / scene.width)), Image.Resampling.LANCZOS)
+    return small.quantize(64, dither=Image.Dither.NONE)
 
 
 if __name__ == "__main__":
