@@ -19,8 +19,8 @@ FRAME_MS, LAST_MS = 50, 1500  # how long each picture is shown, and the last one
 PATH = Path(__file__).with_name("demo.gif")
 THUMBNAILS = Path(__file__).with_name("thumbnails")
 THUMBNAIL_SEED, STEPS = 3, 40
-SCENE = 0.09, 0.72, 0.83  # top, bottom and right end of the robot among its obstacles, as parts of a picture
-WIDTH = 220
+PLANE, SPACE = (0.17, 0.09, 0.67, 0.72), (0.13, 0.09, 0.63, 0.72)  # where the robot is, as parts of a picture
+HEIGHT = 240
 
 
 def main() -> None:
@@ -65,11 +65,9 @@ def thumbnail(env_id: str) -> Image.Image:
     for _ in range(STEPS):
         observation, *_ = env.step(policy.act(observation))
     picture = Image.fromarray(env.render())
-    top, bottom, right = (
-        round(part * size) for part, size in zip(SCENE, (picture.height, picture.height, picture.width), strict=True)
-    )
-    scene = picture.crop((0, top, right, bottom))
-    small = scene.resize((WIDTH, round(WIDTH * scene.height / scene.width)), Image.Resampling.LANCZOS)
+    box = SPACE if "Spatial" in env_id else PLANE
+    scene = picture.crop(tuple(round(part * size) for part, size in zip(box, picture.size * 2, strict=True)))
+    small = scene.resize((round(HEIGHT * scene.width / scene.height), HEIGHT), Image.Resampling.LANCZOS)
     return small.quantize(64, dither=Image.Dither.NONE)
 
 
