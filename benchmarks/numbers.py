@@ -293,8 +293,8 @@ def demo_line(demo: Found) -> str:
     others = ", ".join(f"{name} at {demo['errors_mn'][name][0]:.2f}" for name in ("PI", "MPC"))
     return (
         f"`make demo` took {_duration(demo['seconds'])} on two cores after installation, {digits(demo['steps'])} "
-        f"training steps included, and ended with PPO at a force error of {rmse:.2f} mN [{low:.2f}, {high:.2f}], {others}, on "
-        f"{demo['episodes']} scenes."
+        f"training steps included, and ended with PPO at a force error of {rmse:.2f} mN [{low:.2f}, {high:.2f}], "
+        f"{others}, on {demo['episodes']} scenes."
     )
 
 
