@@ -10,10 +10,11 @@ from rich.table import Table
 from agents.benchmark.cards import card
 from agents.benchmark.figures import draw_curves, draw_episodes, draw_profiles, draw_scores
 from agents.benchmark.suite import Result
-from agents.config import EvaluateConfig
+from agents.config import POLICIES, EvaluateConfig
 from agents.files import JsonObject, write_text
 from agents.learning.actor import LearningCurve
 from agents.learning.pretrained import folder_name
+from agents.tuned import sensing_of
 
 NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
 WIDTH = 190  # of a printed table
@@ -83,8 +84,11 @@ def group(results: list[Result]) -> Grouped:
 def closed(result: Result, rivals: list[Result]) -> float | None:
     """Return the share of the gap between the force errors of the baseline and the bound that a policy closes.
 
-    None where either is missing, or the error of the baseline is shown as zero.
+    None where either is missing, the error of the baseline is shown as zero, or the bound is none: on the paper's own
+    system the force is an estimate, of whose errors the oracle knows nothing unless sensing is ideal.
     """
+    if sensing_of(result.entry.env_id) == "ideal" != result.entry.sensing:
+        return None
     errors = {r.entry.policy: float(r.summary["rmse_iqm_mn"]) for r in rivals}
     if BOUND not in errors or BASELINE not in errors or errors[BASELINE] < SHOWN:
         return None
@@ -120,7 +124,7 @@ def matrix(by_id: Grouped) -> str:
     A policy wins if it closes at least half of the gap between baseline and bound, and its interval lies below that of
     the baseline.
     """
-    names = list(dict.fromkeys(result.entry.policy for here in by_id.values() for result in here))
+    names = sorted({result.entry.policy for here in by_id.values() for result in here}, key=POLICIES.index)
     lines = ["| id | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
     for env_id, here in by_id.items():
         found = {result.entry.policy: result for result in here}

@@ -7,8 +7,9 @@ import numpy as np
 
 from agents.environment import EnvIndex
 from agents.estimation.candidates import ALL, Candidates, Loops
-from agents.estimation.force import ForceFilter
-from agents.estimation.shape import observed_commands, observed_sizes
+from agents.estimation.force import SATURATED, ForceFilter, Work
+from agents.estimation.lever import LEAST_LEVER, BentLevers
+from agents.estimation.shape import observed_commands, observed_ratios
 from agents.estimation.tension import TensionFilter
 from ccr_gym import EXACT, Settings, SpatialSettings
 
@@ -17,14 +18,14 @@ LEAST_SEEN = 1e-3  # of such a standard deviation, where there is no noise [a]
 PLAY_ERROR = 0.001  # standard deviation of a seen command that neither noise nor a constant error explain [a]
 RIGIDITY_ERROR = 0.01  # standard deviation of the nominal tension, over the tension
 LOSS_ERROR = 0.003  # likewise, of the share of friction
-LEAST_LEVER = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
+TINY = 1e-6  # of a spread, where there is none
+AT_REST = 1e-6  # of a motor [a]
 SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
 SHARE_CHANGE = 0.5  # likewise, over its change in a step
-MODEL_ERROR = 0.1  # standard deviation of virtual work over the force: other points move than those of a free robot
-LARGE = 12.0  # force on the nominal robot, whose square the share is over that virtual work falls short [EI/L²]
-SHORT_ERROR = 0.5  # standard deviation of what it falls short by, over that
-LARGEST = 8.0  # such a force up to which this was measured [EI/L²]
-LEAST_RIGIDITY = 0.1  # rigidity ratio, below those that are sampled
+MODEL_ERROR = 0.02  # standard deviation of virtual work over the force
+LEVER_ERROR = 0.005  # standard deviation of a lever [L/a]
+STALL_ERROR = 0.3  # likewise over the force, of a robot that stalls, whose cable does not follow the motor
+LARGE = 12.0  # force on the nominal robot, from which on virtual work tells little [EI/L²]
 
 
 class Knowledge(NamedTuple):
@@ -60,8 +61,8 @@ class RobotEstimator:
     contact force from virtual work: what the cable pulls more than the free robot needs, over the lever of the contact.
     A force sensor, where there is one, corrects the force with the delay that was found.
 
-    Offset and length of random robots are read from the observation; where ``randomize`` hides them, the robots are
-    taken to be the nominal one.
+    Offset and length of random robots are read from the observation. Where ``randomize`` hides them, the offset is
+    found beside the backlash, and the length is taken for the nominal one.
 
     Args:
         settings: Settings of the environments.
@@ -77,13 +78,19 @@ class RobotEstimator:
         self._candidates = candidates
         limit = settings.robot.max_tension / settings.scales.tension_n
         self.loops = Loops(count, commands, candidates)
-        self._tension = TensionFilter(count, commands, candidates, sensing, limit)
+        self._levers = BentLevers(settings)
+        self._slopes = np.zeros((count, commands))  # of the free tension over the motor
+        gain = float(np.sqrt((settings.actuation.matrix**2).sum(axis=0).max()))
+        self._tension = TensionFilter(count, commands, candidates, sensing, limit, gain)
         self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]), settings.force_span)
         self._seen_std = max(SEEN * float(np.mean(sensing.angle_noise)), LEAST_SEEN)
         error = max(SEEN * float(np.mean(sensing.angle_error)), LEAST_SEEN)
         self._offset = (self._seen_std / error) ** 2  # readings that the prior of the seen shape's error is worth
         shape = count, len(candidates.latencies), commands, len(candidates.plays)
-        self._errors, self._squares, self._seen = np.zeros(shape), np.zeros(shape), np.zeros(count)
+        self._sums, self._seen = np.zeros((5, *shape)), np.zeros(count)  # of the errors e, places p, e², p², e p
+        self._scale, spread = _hidden_scale(settings)
+        self._scale_prior = (self._seen_std / max(spread, TINY)) ** 2
+        self._unknown = spread
         self._share = np.zeros(count)  # of the force, that the regulated obstacle had in the model
 
     def reset(self, index: EnvIndex = ALL) -> None:
@@ -91,8 +98,9 @@ class RobotEstimator:
         self.loops.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
-        for part in (self._errors, self._squares, self._seen, self._share):
+        for part in (self._seen, self._share, self._slopes):
             part[index] = 0.0
+        self._sums[:, index] = 0.0
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> Knowledge:
         """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them."""
@@ -102,16 +110,18 @@ class RobotEstimator:
         shape = self._update_shape(observation, index)
         places = self.loops.places[index, 0]
         tensions, free, levers = self._tensions(observation)
-        nominal = _carried(free, motors, places)
+        nominal = self._carried(free, motors, places, index)
         self._tension.update(tensions, nominal, self.loops, touching, index)
         weights, delays = _posteriors(shape, self._tension.log_likelihood[index])
         play = weights.sum(axis=2)
-        force, variance = self._virtual_work(tensions, nominal, levers, weights, index)
+        work = self._virtual_work(tensions, nominal, levers, weights, index)
         latency = _moments(self._candidates.latencies, delays)
-        force, variance, pressing = self._on_target(force, variance, observation, touching, index)
-        force, force_std = self._force.update(observation, force, variance, latency[0], pressing, index)
         rigidity = self._tension.rigidity[index], self._tension.variance[index]
         mean = (weights * rigidity[0]).sum(axis=(1, 2))
+        if "lever" in observation:
+            work = self._bent(work, mean, observation, index)
+        work, pressing = self._on_target(work, observation, touching, index)
+        force, force_std = self._force.update(observation, work, latency[0], pressing, index)
         spread = (weights * (rigidity[1] + (rigidity[0] - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
         half = _moments(self._candidates.plays, play, PLAY_ERROR)
         loss = _moments(self._candidates.losses, weights.sum(axis=1), LOSS_ERROR)
@@ -127,16 +137,24 @@ class RobotEstimator:
         return Knowledge(*(entry[0] for entry in known))
 
     def _update_shape(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
-        """Compare the seen shape with each candidate; return log-likelihoods ``(k, L, B)``."""
-        seen, (_, offset) = observed_commands(observation, self._settings), observed_sizes(observation, self._settings)
-        places = self.loops.places[index][:, self._candidates.latencies] / offset[:, None, None, None]
+        """Compare the seen shape with each candidate; return log-likelihoods ``(k, L, B)``.
+
+        For a candidate the seen commands are linear in an error of the shape and in the offset of the cables, where
+        that is hidden. A robot that stalls does not follow its motors, so its shape is not counted.
+        """
+        seen = observed_commands(observation, self._settings)
+        *_, offset = observed_ratios(observation, self._settings)
+        places = self.loops.places[index][:, self._candidates.latencies] * (self._scale / offset)[:, None, None, None]
         errors = seen[:, None, :, None] - places  # in units of the robot's own offset, as noise is one of angles
-        self._errors[index] += errors
-        self._squares[index] += errors**2
-        self._seen[index] += 1
+        counted = (self._tension.stalls[index] == 0)[:, None, None, None]
+        for total, term in zip(self._sums, (errors, places, errors**2, places**2, errors * places), strict=True):
+            total[index] += np.where(counted, term, 0.0)
+        self._seen[index] += counted[:, 0, 0, 0]
         weight = 1 / (self._seen[index] + self._offset)[:, None, None, None]
-        misfit = (self._squares[index] - self._errors[index] ** 2 * weight).sum(axis=2)
-        return np.asarray(-0.5 * misfit / self._seen_std**2)
+        e, p, ee, pp, ep = (total[index] for total in self._sums)
+        precision = (pp - p**2 * weight).sum(axis=2) + self._scale_prior
+        misfit = (ee - e**2 * weight).sum(axis=2) - (ep - e * p * weight).sum(axis=2) ** 2 / precision
+        return np.asarray(-0.5 * misfit / self._seen_std**2 - 0.5 * np.log(precision / self._scale_prior))
 
     def _tensions(self, observation: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return measured and nominal free tensions as forces on the commands, and levers, ``(k, c)`` each."""
@@ -146,58 +164,74 @@ class RobotEstimator:
         measured, free = (self._tension_span * observation[key].astype(float) for key in ("tension", "free_tension"))
         return self._actuation.forces(measured), free, observation["lever"].astype(float)
 
+    def _carried(self, free: np.ndarray, motors: np.ndarray, places: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return free tensions ``(k, c, B)`` where the cables are, from those at the motors; they are linear in both.
+
+        A motor at 0 leaves its cable where the play ends, and tells nothing of the slope there: that before is kept.
+        """
+        away = np.abs(motors) > AT_REST
+        slopes = np.where(away, free / np.where(away, motors, 1.0), self._slopes[index])
+        self._slopes[index] = slopes
+        return np.asarray(slopes[..., None] * places)
+
     def _virtual_work(
         self, tensions: np.ndarray, nominal: np.ndarray, levers: np.ndarray, weights: np.ndarray, index: EnvIndex
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and variance of the force that virtual work tells, ``(k,)``."""
+    ) -> Work:
+        """Return the force that virtual work of the free robot tells.
+
+        What tensions lack across the lever, or against it, no force explains: it is doubt about the lever.
+        """
         filtered = self._tension
         factors, levers = filtered.factors(self.loops, index), levers[:, :, None, None]
         robot, doubt = filtered.robot_tensions(tensions, index)
         lacking = robot - filtered.rigidity[index][:, None] * nominal[..., None]
         size = np.maximum((levers**2).sum(axis=1), LEAST_LEVER**2)
-        forces = np.maximum((levers * lacking).sum(axis=1) / size, 0.0)
-        short = forces * self._shortfall(forces, filtered.rigidity[index])
-        forces = forces + short
-        inner = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2
-        inner = inner + (levers**2 * doubt).sum(axis=1)
-        inner = inner + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
+        along = (levers * lacking).sum(axis=1) / size
+        forces = np.maximum(along, 0.0)
         mean = (weights * forces).sum(axis=(1, 2))
-        spread = inner / size**2 + (forces - mean[:, None, None]) ** 2
-        model = (MODEL_ERROR * mean) ** 2 + (SHORT_ERROR * (weights * short).sum(axis=(1, 2))) ** 2
-        return mean, (weights * spread).sum(axis=(1, 2)) + model
+        unexplained = ((lacking - levers * forces[:, None]) ** 2 - (filtered.noise / factors) ** 2).sum(axis=1)
+        slow = (levers**2 * doubt).sum(axis=1)
+        slow = slow + ((levers * nominal[..., None]).sum(axis=1)) ** 2 * filtered.variance[index]
+        slow = slow / size**2 + (forces - mean[:, None, None]) ** 2 + np.maximum(unexplained, 0.0) / size
+        white = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2 / size**2
+        return Work(mean, (weights * slow).sum(axis=(1, 2)), (weights * white).sum(axis=(1, 2)))
 
-    def _shortfall(self, forces: np.ndarray, rigidity: np.ndarray) -> np.ndarray:
-        """Return by which share virtual work falls short of forces.
-
-        It counts the motion of a free robot, and a force bends the robot away from that, by the square of the force.
-        """
-        nominal = forces / np.maximum(rigidity, LEAST_RIGIDITY) / self._actuation.sections**2
-        return np.asarray((np.minimum(nominal, LARGEST) / LARGE) ** 2)
+    def _bent(self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray], index: EnvIndex) -> Work:
+        """Return the force for the levers of the robots that it bends."""
+        own, length, offset = observed_ratios(observation, self._settings)
+        unit = rigidity * own / length**2
+        change = self._levers.change(work.force / unit, observation, offset)
+        lever = np.maximum(np.linalg.norm(observation["lever"], axis=1), LEAST_LEVER)
+        force, large = work.force / change, LARGE * self._actuation.sections**2
+        error = np.hypot(MODEL_ERROR, LEVER_ERROR / lever) + self._unknown * np.abs(1 - 1 / change)
+        error = np.minimum(error + (force / unit / large) ** 4, 1.0) + STALL_ERROR * (self._tension.stalls[index] > 0)
+        error = error + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
+        return Work(force, work.slow / change**2 + (error * force) ** 2, work.white / change**2)
 
     def _on_target(
-        self,
-        force: np.ndarray,
-        variance: np.ndarray,
-        observation: Mapping[str, np.ndarray],
-        touching: np.ndarray,
-        index: EnvIndex,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return mean and variance of the force on the regulated obstacle, and whether that touches, ``(k,)`` each.
+        self, work: Work, observation: Mapping[str, np.ndarray], touching: np.ndarray, index: EnvIndex
+    ) -> tuple[Work, np.ndarray]:
+        """Return the force on the regulated obstacle, and whether that touches, ``(k,)``.
 
         The model says how several obstacles share the force, where the cables are as the encoders read them.
         """
         if "share" not in observation:
-            return force, variance, touching
+            return work, touching
         share = observation["share"][:, 0].astype(float)
         error = SHARE_ERROR**2 * share * (1 - share) + SHARE_CHANGE**2 * (share - self._share[index]) ** 2
         self._share[index] = share
-        return share * force, share**2 * variance + error * force**2, touching & (share > 0)
+        slow = share**2 * work.slow + error * work.force**2
+        return Work(share * work.force, slow, share**2 * work.white), touching & (share > 0)
 
 
-def _carried(free: np.ndarray, motors: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return free tensions ``(k, c, B)`` where the cables are, from those at the motors; they are linear in both."""
-    near = np.abs(motors) < 1e-6
-    return np.asarray(free[..., None] * (places / np.where(near, 1.0, motors)[..., None]))
+def _hidden_scale(settings: Settings | SpatialSettings) -> tuple[float, float]:
+    """Return mean and standard deviation of the nominal offset over that of a robot, of which nothing else tells."""
+    robots = settings.randomize
+    if robots is None or robots.observed:
+        return 1.0, 0.0
+    low, high = np.log(robots.offset)
+    ratios = np.exp(-np.linspace(low, high, 33))
+    return float(ratios.mean()), float(ratios.std())
 
 
 def _posteriors(shape: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ def observed_commands(observation: Mapping[str, np.ndarray], settings: Settings 
             offset and length, and without the entry they are taken to be the nominal ones.
         settings: Settings of the environment.
     """
-    robot, (length, offset) = settings.robot, observed_sizes(observation, settings)
+    robot, (_, length, offset) = settings.robot, observed_ratios(observation, settings)
     nodes = observation["nodes"].astype(float).reshape(*observation["nodes"].shape[:-1], -1, 3)
     if isinstance(robot, Robot):
         points, sides = _planar_shape(nodes, settings.reach_mm)
@@ -42,15 +42,15 @@ def observed_commands(observation: Mapping[str, np.ndarray], settings: Settings 
     return np.asarray(commands.reshape(*nodes.shape[:-2], -1))
 
 
-def observed_sizes(
+def observed_ratios(
     observation: Mapping[str, np.ndarray], settings: Settings | SpatialSettings
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return length and offset of robots over the nominal ones, ``(...)`` each, 1 where nothing tells them."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rigidity, length and offset over the nominal ones, ``(...)`` each, 1 where nothing tells them."""
     if settings.randomize is None or "robot" not in observation:
         one = np.ones(observation["nodes"].shape[:-1])
-        return one, one
+        return one, one, one
     ratios = settings.randomize.ratios(observation["robot"].astype(float))
-    return ratios[..., 1], ratios[..., 2]
+    return ratios[..., 0], ratios[..., 1], ratios[..., 2]
 
 
 def _planar_shape(nodes: np.ndarray, reach_mm: float) -> tuple[np.ndarray, np.ndarray]:

@@ -12,12 +12,12 @@ from agents.environment import EnvIndex
 from agents.estimation.candidates import Candidates, Loops
 from ccr_gym import Sensing
 
-RIGIDITY = 1.0, 1.0  # mean and standard deviation of the prior of the rigidity ratio
 SMOOTHNESS = 0.9  # weight of the past in the lines through tensions in contact, per step
 SLIP = 0.02  # standard deviation of a tension in contact from such a line, over the tension
 COUNTED = 0.5  # share of the evidence before contact that counts, as the nominal tension is only nearly known
 TRUST = 0.1  # share of the evidence in contact that counts, as errors of neighbouring steps are alike
 STALLED = 0.9  # tension over its limit, from which on a robot may have stalled
+STALL_STEPS = 8  # after a stall, in which a late shape and a motor that ran ahead of its cable tell nothing
 LEAST = 1e-3  # of standard deviations, for candidates without noise [EI/(aL)]
 
 
@@ -30,6 +30,7 @@ class TensionFilter:
         candidates: The candidates.
         sensing: Ranges of the imperfections.
         limit: Tension at which the nominal robot stalls [EI/(aL)].
+        gain: Largest root of the sum of squares of the cables' shares in a command, by which their errors add up.
 
     Attributes:
         log_likelihood: Of the candidates of backlash and friction, ``(N, B, E)``.
@@ -37,12 +38,18 @@ class TensionFilter:
         variance: Its variance, ``(N, B, E)``.
         zeros: Means of the zeros, ``(N, c, B, E)`` [EI/(aL)].
         inward: Probabilities that the cables last moved in, ``(N, c, B, E)``.
+        stalls: Steps until what a stall has left of the cables' places is forgotten, ``(N,)``.
     """
 
-    def __init__(self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float) -> None:
+    def __init__(
+        self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float, gain: float
+    ) -> None:
         self._limit, self._kept = limit, 1 - candidates.losses
-        self.noise = max(sensing.tension_noise[1], LEAST)
-        zero = max(sensing.tension_zero[1] / np.sqrt(3), LEAST)
+        self.noise = max(gain * sensing.tension_noise[1], LEAST)
+        self._least, self._most = sensing.rigidity_ratio
+        self._usual, spread = (self._least + self._most) / 2, max((self._most - self._least) / np.sqrt(12), LEAST)
+        self._ridge = (self.noise / spread) ** 2  # what the prior of the rigidity ratio weighs
+        zero = max(gain * sensing.tension_zero[1] / np.sqrt(3), LEAST)
         self._prior = (self.noise / zero) ** 2  # readings that the prior of a zero is worth
         shape = count, commands, len(candidates.plays), len(candidates.losses)
         self._sums = np.zeros((5, *shape))  # of 1, x, y, x², x y
@@ -51,18 +58,20 @@ class TensionFilter:
         self._broken = np.zeros((count, *shape[2:]))  # log-likelihood from contact
         self._onset = np.full(count, np.inf)  # size of the commands at the first contact [a]
         self._margin = 2 * float(candidates.plays[-1])
-        self.rigidity, self.variance = np.full((2, count, *shape[2:]), RIGIDITY[0])
+        self.rigidity = np.full((count, *shape[2:]), self._usual)
+        self.variance = np.full(self.rigidity.shape, self.noise**2 / self._ridge)
         self.zeros, self.inward = np.zeros(shape), np.ones(shape)
         self.log_likelihood = np.zeros((count, *shape[2:]))
+        self.stalls = np.zeros(count, int)
 
     def reset(self, index: EnvIndex) -> None:
         """Start new episodes of some robots."""
         self._sums[:, index] = self._lines[:, index] = 0.0
-        for part in (self._squares, self._broken, self.zeros, self.log_likelihood):
+        for part in (self._squares, self._broken, self.zeros, self.log_likelihood, self.stalls):
             part[index] = 0.0
         self.inward[index] = 1.0
         self._onset[index] = np.inf
-        self.rigidity[index], self.variance[index] = RIGIDITY[0], RIGIDITY[1] ** 2
+        self.rigidity[index], self.variance[index] = self._usual, self.noise**2 / self._ridge
 
     def update(
         self, tensions: np.ndarray, nominal: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
@@ -99,17 +108,19 @@ class TensionFilter:
         self._squares[index] += np.where(wanted[:, None], tensions**2, 0.0)
 
     def _evidence(self, index: EnvIndex) -> np.ndarray:
-        """Solve for rigidity and zeros of each candidate, and return its log-likelihood, ``(k, B, E)``."""
+        """Solve for rigidity and zeros of each candidate, and return its log-likelihood, ``(k, B, E)``.
+
+        The rigidity is the likeliest one in its range, so that noise never makes it negative.
+        """
         count, sx, sy, sxx, sxy = (total[index] for total in self._sums)
         weight = 1 / (count + self._prior)  # a zero is taken out of each command
         cxx, cxy = (sxx - sx * sx * weight).sum(axis=1), (sxy - sx * sy * weight).sum(axis=1)
         cyy = (self._squares[index][..., None, None] - sy * sy * weight).sum(axis=1)
-        prior = (self.noise / RIGIDITY[1]) ** 2
-        precision = cxx + prior
-        mean = (cxy + prior * RIGIDITY[0]) / precision
+        precision, product = cxx + self._ridge, cxy + self._ridge * self._usual
+        mean = np.clip(product / precision, self._least, self._most)
         self.rigidity[index], self.variance[index] = mean, self.noise**2 / precision
         self.zeros[index] = (sy - mean[:, None] * sx) * weight
-        misfit = cyy + prior * RIGIDITY[0] ** 2 - mean**2 * precision
+        misfit = cyy + self._ridge * self._usual**2 + mean * (mean * precision - 2 * product)
         return np.asarray(COUNTED * (-0.5 * misfit / self.noise**2 - 0.5 * np.log(precision)))
 
     def robot_tensions(self, tensions: np.ndarray, index: EnvIndex) -> tuple[np.ndarray, np.ndarray]:
@@ -128,8 +139,11 @@ class TensionFilter:
 
         A robot that stalls does not follow its motor, and what it touches may have moved its cable either way.
         """
-        stalled = np.abs(both[1]) > STALLED * self._limit * self.rigidity[index][:, None]
-        return np.where(stalled, 0.5, inward)
+        return np.where(self._stalled(both[1], index), 0.5, inward)
+
+    def _stalled(self, robot: np.ndarray, index: EnvIndex) -> np.ndarray:
+        """Return whether robots with such tensions may have stalled, ``(k, c, B, E)``."""
+        return np.asarray(np.abs(robot) > STALLED * self._limit * self.rigidity[index][:, None])
 
     def _update_contact(
         self, tensions: np.ndarray, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
@@ -139,6 +153,8 @@ class TensionFilter:
         Where it is open which way a cable last moved, the tensions of both directions are compared.
         """
         both = self._both_ways(tensions, index)
+        stalled = self._stalled(both[0], index).mean(axis=(2, 3)).max(axis=1) > 0.5
+        self.stalls[index] = np.where(stalled, STALL_STEPS, np.maximum(self.stalls[index] - 1, 0))
         expected = self._expected(both, loops.inward(index)[..., None], index)
         at = np.broadcast_to(places[..., None], both.shape[1:])
         count, sl, st, sll, slt = (total[index] for total in self._lines)
@@ -154,7 +170,8 @@ class TensionFilter:
         error = both - mean_t - slope * (at - mean_l)
         likely = np.where(known, -0.5 * error**2 / variance - 0.5 * np.log(variance), 0.0)
         self.inward[index], broken = _judged(expected, likely)
-        self._broken[index] += TRUST * broken.sum(axis=1)
+        following = (self.stalls[index] == 0)[:, None, None]
+        self._broken[index] += np.where(following, TRUST * broken.sum(axis=1), 0.0)
         robot = _mixed(self.inward[index], *both)
         terms = (np.ones_like(robot), at, robot, at * at, at * robot)
         decay = np.where(touching, SMOOTHNESS, 1.0)[:, None, None, None]

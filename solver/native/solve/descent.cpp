@@ -14,7 +14,9 @@ using namespace tolerances;
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command) {
   const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
-  const bool motor_holds = !loading && !only_releases(command) && !moves_obstacles(command);
+  const bool lets_out = Model::kRod && layout_.cables.size == 1 && !pulls_cable(command) &&
+                        pull(command, 0) < pull(present_.command, 0);  // whatever the base does
+  const bool motor_holds = !loading && !lets_out && !only_releases(command) && !moves_obstacles(command);
   const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
   if (!bends_evenly_ && !problem_.touches_obstacle(present_.active)) {

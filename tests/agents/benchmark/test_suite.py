@@ -98,6 +98,16 @@ def test_the_share_that_is_closed_and_whether_intervals_are_apart():
     assert report.closed(good, exact) is None
 
 
+def test_the_oracle_is_no_bound_where_the_paper_s_estimate_is_regulated_by_imperfect_sensors():
+    def result(name, sensing, error):
+        metrics = {metric: np.full((1, 20), error) for metric in METRICS}
+        return suite.Result(Entry(name, "CCR/LoadCell-Paper-v1", sensing), metrics, suite.summarize(metrics))
+
+    for sensing, share in (("ideal", pytest.approx(2.0)), ("realistic", None), ("sensorless", None)):
+        rivals = [result("PI", sensing, 10.0), result("Oracle", sensing, 9.0)]
+        assert report.closed(result("MPC", sensing, 8.0), rivals) == share
+
+
 def test_environments_without_a_learner_have_no_learning_curves(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(report, "draw_curves", lambda curves, out: drawn.append(list(curves)))
