@@ -95,13 +95,14 @@ def train(config: TrainConfig) -> None:
 
 def evaluate(config: EvaluateConfig) -> None:
     """Evaluate policies on test scenes."""
-    from rich.progress import track
-
     from agents.benchmark import report, suite
+    from agents.progress import followed
 
     entries = suite.entries(config)
     (config.out / "videos" if config.video else config.out).mkdir(parents=True, exist_ok=True)
-    results = list(track(suite.play_all(config, entries), "evaluate", len(entries)))
+    results = list(followed(suite.play_all(config, entries), "evaluate", len(entries)))
+    if config.video:
+        list(followed(suite.film_all(config, results), "film", len(results)))
     report.write(sorted(results, key=lambda result: entries.index(result.entry)), config)
     print("Force error: root mean square after the search, as interquartile mean with its 95 % interval.")
     baseline, bound = report.BASELINE, report.BOUND
