@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(VENV)/.installed
 
-.PHONY: demo test coverage lint docs native sanitize address thread bench instructions soak browser clients readme clean
+.PHONY: demo test coverage lint docs numbers native sanitize address thread bench instructions soak browser clients readme clean
 
 NATIVE = $(BIN)/cmake -S tests/native -DPython_EXECUTABLE=$(abspath $(BIN)/python) -B
 BUILD = $(BIN)/cmake --build
@@ -34,6 +34,9 @@ lint: $(INSTALL)
 
 docs: $(INSTALL)  ## the documentation, in build/docs; warnings are errors
 	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -q -W --keep-going -b html docs build/docs
+
+numbers: $(INSTALL)  ## numbers of README and docs, from the result files in docs/results
+	$(BIN)/python -m benchmarks.numbers $(NUMBERS)
 
 native: $(INSTALL)  ## tests of the kernel in C++ (needs doctest: apt-get install doctest-dev)
 	$(NATIVE) build/native

@@ -1,10 +1,14 @@
 """The commands of ``ccr-gym``; each imports what it needs when it runs."""
 
+import contextlib
+import io
+import sys
 from collections.abc import Sequence
 from typing import Annotated
 
 import tyro
 
+from agents.command_line import learner_first, one_line
 from agents.config import (
     BenchConfig,
     EstimateConfig,
@@ -16,6 +20,9 @@ from agents.config import (
     TrainConfig,
 )
 from agents.errors import UserError
+from ccr_gym import __version__
+
+ABOUT = "Train, evaluate and compare policies; --version prints the version."
 
 Command = (
     Annotated[TrainConfig, tyro.conf.subcommand("train")]
@@ -54,10 +61,24 @@ def parse(arguments: Sequence[str] | None = None) -> Command:
     """Return the command and its settings from arguments, by default those of the process.
 
     Raises:
-        SystemExit: If it asks for help or has an error, after printing either.
+        SystemExit: If it asks for help or for the version, after printing it.
+        UserError: If the arguments have an error.
     """
-    settings = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes)
-    command: Command = tyro.cli(Command, prog="ccr-gym", args=arguments, config=settings)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given[:1] == ["--version"]:
+        print(f"ccr-gym {__version__}")
+        raise SystemExit
+    settings = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.conf.CascadeSubcommandArgs)
+    written = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(written):
+            command: Command = tyro.cli(
+                Command, prog="ccr-gym", args=learner_first(given), description=ABOUT, config=settings
+            )
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            raise
+        raise UserError(one_line(written.getvalue(), given)) from None
     return command
 
 
@@ -74,13 +95,14 @@ def train(config: TrainConfig) -> None:
 
 def evaluate(config: EvaluateConfig) -> None:
     """Evaluate policies on test scenes."""
-    from rich.progress import track
-
     from agents.benchmark import report, suite
+    from agents.progress import followed
 
     entries = suite.entries(config)
     (config.out / "videos" if config.video else config.out).mkdir(parents=True, exist_ok=True)
-    results = list(track(suite.play_all(config, entries), "evaluate", len(entries)))
+    results = list(followed(suite.play_all(config, entries), "evaluate", len(entries)))
+    if config.video:
+        list(followed(suite.film_all(config, results), "film", len(results)))
     report.write(sorted(results, key=lambda result: entries.index(result.entry)), config)
     print("Force error: root mean square after the search, as interquartile mean with its 95 % interval.")
     baseline, bound = report.BASELINE, report.BOUND

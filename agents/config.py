@@ -159,7 +159,7 @@ class EvaluateConfig:
     seed: int = EVALUATION_SEED
     """Seed of the first test scene; at least 1 000 000, beyond the seeds of training."""
     video: bool = True
-    """Record one episode of every policy and environment to a video."""
+    """Record a video of every policy, in the test scene of each environment where policies differ most."""
     jobs: int = 2
     """Processes in parallel."""
 

@@ -7,10 +7,8 @@ and several processes share the work; after a change of what is measured, delete
 writes into ``runs/tables/evaluation``.
 """
 
-import json
 import pickle
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -29,27 +27,20 @@ from agents.config import EVALUATION_SEED, POLICIES, EvaluateConfig
 from agents.environment import make_env
 from agents.policy import Observation
 from agents.tuned import LEARNERS, sensing_of
+from benchmarks import numbers
+from benchmarks.evaluation_text import HEADROOM
 from ccr_gym import ENV_IDS, PrivilegedState
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "runs/tables"
-DOCS = ("README.md", "docs/benchmark.md", "docs/sensing.md")
 EPISODES = 60
 SENSINGS = ("realistic", "sensorless")
 IDS = tuple(env_id for env_id in ENV_IDS if "-Paper-" not in env_id)
 HONEST = ("P", "PI", "MPC", "Harmonic")  # controllers that see what agents see
-HEADROOM = (*HONEST, "Newton", "Oracle")
 LEAST_ERROR, LARGEST_SHARE = 0.05, 0.5  # of the set-point, and of the best controller's error: there is room
 ROBOTS, STEPS = 1000, (8, 16, 32, 48, 64, 96, 128)  # of the table of what the estimator knows
 PROFILE_STEPS = 128  # of an episode whose set-point moves
 LEAST_FORCE, LEAST_SHARE = 0.1, 0.2  # that counts as pressing [EI/L²], and of robots that press for a number of theirs
-NAMES = {
-    "latency": "latency",
-    "half_backlash": "half of the play [a]",
-    "loss": "loss η",
-    "rigidity": "rigidity r",
-    "force": "force",
-}
 T = TypeVar("T")
 Row = dict[str, Any]
 
@@ -154,18 +145,6 @@ def headroom(results: Sequence[Result]) -> list[Row]:
     return rows
 
 
-def headroom_table(rows: Sequence[Row]) -> str:
-    """Return the table of headroom."""
-    lines = [_line("id", "sensing", "set-point", *HEADROOM, "best, of the set-point", "room")]
-    lines.append("| --- " * (len(HEADROOM) + 5) + "|")
-    for row in rows:
-        errors = ("{:.1f} [{:.1f}, {:.1f}]".format(*row["errors"][p]) if p in row["errors"] else "" for p in HEADROOM)
-        name, share = f"`{row['id'][4:-3]}`", f"{row['best'] / row['set_point']:.1%}".replace("%", " %")
-        room = "yes" if row["room"] else "no"
-        lines.append(_line(name, row["sensing"], f"{row['set_point']:.0f}", *errors, share, room))
-    return "\n".join(lines)
-
-
 def knowledge(env_id: str, sensing: str) -> list[Row]:
     """Return errors of the estimator, and how often the truth is within two standard deviations.
 
@@ -217,25 +196,6 @@ def _errors(known: Knowledge, state: PrivilegedState, settings: Any, force: np.n
     return found
 
 
-def knowledge_table(rows: Sequence[Row]) -> str:
-    """Return the table of what the estimator knows."""
-    lines = [_line("id", "sensing", "step", *NAMES.values()), "| --- " * (len(NAMES) + 3) + "|"]
-    forms = {
-        "latency": "{:.0%} wrong",
-        "half_backlash": "{:.4f}",
-        "loss": "{:.4f}",
-        "rigidity": "{:.1%}",
-        "force": "{:.1%}",
-    }
-    for row in rows:
-        cells = [
-            (f"{forms[name].format(row[name][0])} ({100 * row[name][1]:.0f})" if name in row else "").replace("%", " %")
-            for name in NAMES
-        ]
-        lines.append(_line(f"`{row['id']}`", row["sensing"], row["step"], *cells))
-    return "\n".join(lines)
-
-
 class Told(PredictiveController):
     """MPC that is told the flags of the robot itself."""
 
@@ -257,56 +217,18 @@ def cost_of_flags(env_id: str, sensing: str) -> Row:
     return {"id": env_id, "sensing": sensing, "fall": float(iqm(fall)), "low": low, "high": high}
 
 
-def cost_table(rows: Sequence[Row]) -> str:
-    """Return the table of what wrong flags cost."""
-    lines = [_line("id", "sensing", "error of MPC falls by [mN]"), "| --- | --- | --- |"]
-    shown = ("{fall:.2f} [{low:.2f}, {high:.2f}]".format(**row) for row in rows)
-    lines += [_line(f"`{row['id']}`", row["sensing"], text) for row, text in zip(rows, shown, strict=True)]
-    return "\n".join(lines)
-
-
-def _line(*cells: object) -> str:
-    return "| " + " | ".join(map(str, cells)) + " |"
-
-
-def fill(text: str, tables: Mapping[str, str]) -> str:
-    """Return a text with tables between their marks.
-
-    Raises:
-        ValueError: If a mark names a table that is not there.
-    """
-
-    def filled(found: re.Match[str]) -> str:
-        if found[1] not in tables:
-            raise ValueError(f"the mark {found[1]!r} names no table; tables are {', '.join(tables)}")
-        return f"<!-- numbers: {found[1]} -->\n{tables[found[1]]}\n<!-- /numbers -->"
-
-    return re.sub(r"<!-- numbers: (.+?) -->\n.*?<!-- /numbers -->", filled, text, flags=re.DOTALL)
-
-
 def write() -> None:
     """Write results, tables and the folder of an evaluation from what is kept."""
     results = [found for path in sorted(KEPT.glob("*-v1-*.pkl")) if isinstance(found := load(path), Result)]
     results.sort(key=lambda r: (list(ENV_IDS).index(r.entry.env_id), POLICIES.index(r.entry.policy)))
     usual = [r for r in results if r.entry.sensing == sensing_of(r.entry.env_id)]
-    rows = {
-        "headroom": headroom(results),
-        "knowledge": [row for path in _kept_of("knowledge") for row in load(path) or ()],
-        "cost of flags": [row for path in _kept_of("flags") if (row := load(path))],
-    }
-    for name, values in rows.items():
-        path = ROOT / "docs/results" / f"{name.replace(' ', '_')}.json"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(json.dumps(values, indent=1) + "\n")
-    by_id = report.group(usual)
-    makers = {"headroom": headroom_table, "knowledge": knowledge_table, "cost of flags": cost_table}
-    tables = {name: makers[name](values) for name, values in rows.items()}
-    tables |= {"errors": report.matrix(by_id).strip(), "policies": report.markdown(by_id).strip()}
-    for doc in DOCS:
-        path = ROOT / doc
-        path.write_text(fill(path.read_text(), tables))
+    numbers.save("headroom", headroom(results))
+    numbers.save("knowledge", [row for path in _kept_of("knowledge") for row in load(path) or ()])
+    numbers.save("cost_of_flags", [row for path in _kept_of("flags") if (row := load(path))])
     (KEPT / "evaluation/videos").mkdir(parents=True, exist_ok=True)
     report.write(usual, EvaluateConfig(out=KEPT / "evaluation", episodes=EPISODES))
+    numbers.take_evaluation(KEPT / "evaluation/evaluation.json")
+    numbers.write()
 
 
 def _kept_of(kind: str) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Pages of the documentation show what their examples print, and the picture that they begin with is small."""
+"""README and docs show what their examples print, and the pictures that they begin with are small and there."""
 
 import re
 import subprocess
@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 
+import ccr_gym
+
 DOCS = Path(__file__).parents[1] / "docs"
 PRINTED = re.compile(r"^```python\n(.*?)^```\n\n```text\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN = {
     f"{page.stem} {k}": block
-    for page in sorted(DOCS.glob("*.md"))
+    for page in [DOCS.parent / "README.md", *sorted(DOCS.glob("*.md"))]
     for k, block in enumerate(PRINTED.findall(page.read_text()))
 }
 
@@ -23,9 +25,17 @@ def test_page_shows_what_is_printed(name, tmp_path):
     assert done.stdout == shown
 
 
-def test_first_example_shows_a_contact_and_a_force():
-    assert re.search(r"node \[\d+\] force \[N\] \[\s*-0\.\d", SHOWN["index 0"][1])
+@pytest.mark.parametrize("page", ["README", "index"])
+def test_first_example_shows_a_contact_and_a_force(page):
+    code, shown = SHOWN[f"{page} 0"]
+    assert re.search(r"node \[\d+\] force \[N\] \[\s*-0\.\d", shown)
+    assert len(code.strip().splitlines()) <= 7
 
 
 def test_animation_is_small():
     assert (DOCS / "demo.gif").stat().st_size < 2e6
+
+
+def test_every_environment_has_a_thumbnail():
+    names = {env_id.split("/")[1] for env_id in ccr_gym.ENV_IDS}
+    assert {path.stem for path in (DOCS / "thumbnails").glob("*.png")} == names

@@ -13,12 +13,17 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 PAGES = [README, *(page.read_text() for page in sorted((ROOT / "docs").glob("*.md")))]
 BLOCKS = [block for page in PAGES for block in re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)]
-COMMANDS = [
-    command
-    for block in re.findall(r"^```console\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
-    for line in block.splitlines()
-    for command in line.split("#")[0].split("&&")
-]
+COMMANDS = sorted(
+    {
+        command.strip(" ()")
+        for page in PAGES
+        for block in re.findall(r"^```console\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+        for line in block.replace("\\\n", " ").splitlines()
+        for command in line.split("#")[0].split("&&")
+        if command.strip()
+    }
+)
+OTHERS = {"cd", "cp", "git", "tensorboard"}
 
 
 @pytest.mark.parametrize("code", BLOCKS, ids=range(len(BLOCKS)))
@@ -39,8 +44,11 @@ def test_command_is_there(command):
         from agents.commands import parse
 
         parse(arguments)
+    elif program == "python":
+        module = arguments[1].replace(".", "/") if arguments[0] == "-m" else arguments[0]
+        assert any((ROOT / f"{module}{suffix}").exists() for suffix in ("", ".py"))
     else:
-        assert program == "tensorboard"
+        assert program in OTHERS
 
 
 @pytest.mark.parametrize(

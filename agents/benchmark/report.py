@@ -3,40 +3,53 @@
 import json
 from collections.abc import Callable
 
+import gymnasium
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from agents.benchmark.cards import card
 from agents.benchmark.figures import draw_curves, draw_episodes, draw_profiles, draw_scores
 from agents.benchmark.suite import Result
-from agents.config import EvaluateConfig
+from agents.config import POLICIES, EvaluateConfig
 from agents.files import JsonObject, write_text
 from agents.learning.actor import LearningCurve
 from agents.learning.pretrained import folder_name
 from agents.tuned import sensing_of
 
-NARROW = ("policy", "closed", "force error [mN]", "decisions/s")
-WIDTH = 190  # of a printed table
+WIDTH = 80  # of a printed table
 BOUND, BASELINE = "Oracle", "PI"
 SHOWN = 0.005  # smallest force error that a table shows [mN]; of less a share says nothing
 COLUMNS: dict[str, Callable[[JsonObject], str]] = {  # heading of a column, and its text from a summary
     "force error [mN]": lambda s: "{:.2f} [{:.2f}, {:.2f}]".format(s["rmse_iqm_mn"], *s["rmse_interval_mn"]),
-    "first seed": lambda s: f"{s['rmse_of_seeds_mn'][0]:.2f}" if len(s["rmse_of_seeds_mn"]) > 1 else "",
-    "worst tenth": lambda s: f"{s['rmse_cvar_mn']:.1f}",
-    "steady": lambda s: f"{s['steady_mn']:.2f}",
+    "first seed [mN]": lambda s: f"{s['rmse_of_seeds_mn'][0]:.2f}" if len(s["rmse_of_seeds_mn"]) > 1 else "",
+    "worst tenth [mN]": lambda s: f"{s['rmse_cvar_mn']:.1f}",
+    "steady [mN]": lambda s: f"{s['steady_mn']:.2f}",
     "within 5 %": lambda s: f"{s['success']:.0%}",
-    "settled": lambda s: f"{s['settling_step']:.0f}",
+    "settled [step]": lambda s: f"{s['settling_step']:.0f}" if s["settling_step"] <= s["steps"] else "never",
     "overshoot": lambda s: f"{s['overshoot']:.0%}",
-    "contact lost": lambda s: f"{s['contact_losses']:.2f}",
+    "contact lost [times]": lambda s: f"{s['contact_losses']:.2f}",
     "peak [mN]": lambda s: f"{s['peak_mn']:.0f}",
-    "over limit": lambda s: f"{s['violations']:.2f}",
+    "over limit [steps]": lambda s: f"{s['violations']:.2f}",
     "by estimate [mN]": lambda s: f"{s['estimate_rmse_mn']:.0f}",
     "events": lambda s: f"{1 - s['statuses'].get('CONVERGED', 0) / sum(s['statuses'].values()):.2%}",
     "decisions/s": lambda s: f"{s['decisions_per_second']:.0f}",
     "training": lambda s: f"{s['training_seconds']:.0f} s" if s["training_seconds"] else "",
 }
 HEADINGS = ("policy", "closed", *COLUMNS)
+PRINTED = {  # columns of the printed table, and their headings there
+    "policy": "policy",
+    "closed": "closed",
+    "force error [mN]": "force error\n[mN]",
+    "worst tenth [mN]": "worst\ntenth\n[mN]",
+    "steady [mN]": "steady\n[mN]",
+    "within 5 %": "within\n5 %",
+    "settled [step]": "settled\n[step]",
+    "overshoot": "over-\nshoot",
+    "peak [mN]": "peak\n[mN]",
+}
 Grouped = dict[str, list[Result]]  # results by environment
 
 
@@ -103,17 +116,26 @@ def is_below(result: Result, rivals: list[Result]) -> bool:
 
 def cells(result: Result, rivals: list[Result]) -> list[str]:
     """Return a row of the table."""
-    summary, share = result.summary, closed(result, rivals)
+    spec = gymnasium.spec(result.entry.env_id)
+    summary, share = {**result.summary, "steps": spec.max_episode_steps}, closed(result, rivals)
     gain = "" if share is None else f"{share:.0%}" + (" *" if is_below(result, rivals) else "")
     return [result.entry.policy, gain, *(text(summary) for text in COLUMNS.values())]
+
+
+def filled(here: list[Result]) -> list[dict[str, str]]:
+    """Return the rows of a table by heading, without the columns that are empty in all of them."""
+    rows = [dict(zip(HEADINGS, cells(result, here), strict=True)) for result in here]
+    kept = [heading for heading in HEADINGS if any(row[heading] for row in rows)]
+    return [{heading: row[heading] for heading in kept} for row in rows]
 
 
 def markdown(by_id: Grouped) -> str:
     """Return a table for every environment, in Markdown."""
     lines: list[str] = []
     for env_id, here in by_id.items():
-        lines += [f"### {env_id}", "", "| " + " | ".join(HEADINGS) + " |", "| --- " * len(HEADINGS) + "|"]
-        lines += ["| " + " | ".join(cells(result, here)) + " |" for result in here]
+        rows = filled(here)
+        lines += [f"### {env_id}", "", "| " + " | ".join(rows[0]) + " |", "| --- " * len(rows[0]) + "|"]
+        lines += ["| " + " | ".join(row.values()) + " |" for row in rows]
         lines.append("")
     return "\n".join(lines)
 
@@ -124,7 +146,7 @@ def matrix(by_id: Grouped) -> str:
     A policy wins if it closes at least half of the gap between baseline and bound, and its interval lies below that of
     the baseline.
     """
-    names = list(dict.fromkeys(result.entry.policy for here in by_id.values() for result in here))
+    names = sorted({result.entry.policy for here in by_id.values() for result in here}, key=POLICIES.index)
     lines = ["| id | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
     for env_id, here in by_id.items():
         found = {result.entry.policy: result for result in here}
@@ -143,14 +165,15 @@ def _cell(result: Result | None, rivals: list[Result]) -> str:
 
 
 def show(by_id: Grouped) -> None:
-    """Print the tables."""
+    """Print the tables, with the columns that 80 characters have room for."""
     console = Console(width=max(WIDTH, Console().width))
     for env_id, here in by_id.items():
-        table = Table(title=f"{env_id}, {here[0].entry.sensing} sensing")
-        for heading in HEADINGS:
-            table.add_column(heading, justify="left" if heading == "policy" else "right", no_wrap=heading in NARROW)
-        for result in here:
-            table.add_row(*cells(result, here))
+        rows = [{name: text for name, text in row.items() if name in PRINTED} for row in filled(here)]
+        table = Table(title=f"{env_id}, {here[0].entry.sensing} sensing", box=SIMPLE_HEAD, padding=0, show_edge=False)
+        for name in rows[0]:
+            table.add_column(Text(PRINTED[name]), justify="left" if name == "policy" else "right", no_wrap=True)
+        for row in rows:
+            table.add_row(*map(Text, row.values()))
         console.print(table)
 
 

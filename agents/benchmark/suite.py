@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -173,14 +174,13 @@ def _check_files(entry: Entry) -> None:
                 )
 
 
-def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> Result:
+def play(entry: Entry, seed: int, episodes: int) -> Result:
     """Play the episodes of an entry.
 
     Args:
         entry: The entry.
         seed: Seed of the first episode; the others have the following ones.
         episodes: Number of episodes per training seed.
-        video: Path of a video of the first episode, if there is to be one.
     """
     kwargs = {"sensing": entry.sensing, "split": "test"}
     policies, shown, rows = entry.load(), [], []
@@ -195,8 +195,6 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
             steps, seconds = steps + len(episode.force), seconds + episode.seconds
             if keep:
                 shown.append(episode)
-    if video is not None:
-        record(policies[0], entry.env_id, seed, video, **kwargs)
     table = np.array(rows).reshape(len(policies), episodes, len(METRICS))
     metrics = {name: table[..., k] for k, name in enumerate(METRICS)}
     trainings = tuple(policy.training for policy in policies if isinstance(policy, LearnedPolicy))
@@ -209,15 +207,39 @@ def play(entry: Entry, seed: int, episodes: int, video: Path | None = None) -> R
 
 
 def play_all(config: EvaluateConfig, entries: Sequence[Entry]) -> Iterator[Result]:
-    """Play entries in several processes, and yield their results; the slowest entries start first."""
+    """Play entries in several processes, and yield results as they come; the slowest entries start first."""
+    with worker_pool(config.jobs) as pool:
+        slowest_first = sorted(entries, key=_speed)
+        futures = [pool.submit(play, entry, config.seed, config.episodes) for entry in slowest_first]
+        for future in as_completed(futures):
+            yield future.result()
+
+
+def film_all(config: EvaluateConfig, results: Sequence[Result]) -> Iterator[Path]:
+    """Record a video of every entry in several processes, all of an environment in one scene, and yield the files."""
     with worker_pool(config.jobs) as pool:
         futures = []
-        for entry in sorted(entries, key=_speed):
-            name = f"{folder_name(entry.env_id)}-{entry.policy}.mp4"
-            video = config.out / "videos" / name if config.video else None
-            futures.append(pool.submit(play, entry, config.seed, config.episodes, video))
-        for future in futures:
+        for result in results:
+            entry = result.entry
+            scene = telling_scene([other for other in results if other.entry.env_id == entry.env_id])
+            path = config.out / "videos" / f"{folder_name(entry.env_id)}-{entry.policy}.mp4"
+            futures.append(pool.submit(film, entry, config.seed + scene, path))
+        for future in as_completed(futures):
             yield future.result()
+
+
+def film(entry: Entry, seed: int, path: Path) -> Path:
+    """Record a video of the first training seed, and return its file."""
+    record(entry.load()[0], entry.env_id, seed, path, sensing=entry.sensing, split="test")
+    return path
+
+
+def telling_scene(results: Sequence[Result]) -> int:
+    """Return the scene in which policies differ most, of those where one of them ends at the set-point, if any."""
+    errors = np.array([result.rmse[0] for result in results])
+    reached = np.array([result.metrics["success"][0] for result in results]).max(axis=0) > 0
+    spread = errors.max(axis=0) - errors.min(axis=0)
+    return int(np.argmax(np.where(reached, spread, -1.0) if reached.any() else spread))
 
 
 def _speed(entry: Entry) -> tuple[bool, bool]:

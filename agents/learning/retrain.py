@@ -4,13 +4,12 @@ import shutil
 from concurrent.futures import as_completed
 from dataclasses import replace
 
-from rich.progress import track
-
 from agents.config import RetrainConfig, TrainConfig
 from agents.files import replacing
 from agents.learning.actor import ACTOR
 from agents.learning.pretrained import SUFFIX, folder_name
 from agents.learning.training import is_finished, train
+from agents.progress import followed
 from agents.tuned import learner_settings, sensing_of
 from agents.workers import worker_pool
 
@@ -43,7 +42,7 @@ def retrain(config: RetrainConfig) -> None:
     missing = [run for run in configs if not is_finished(run)]
     with worker_pool(config.jobs) as pool:
         futures = [pool.submit(train, run, False) for run in missing]
-        for future in track(as_completed(futures), "retrain", len(futures)):
+        for future in followed(as_completed(futures), "retrain", len(futures)):
             future.result()
     for run in configs:
         with replacing(run.run.with_suffix(SUFFIX)) as partial:

@@ -76,6 +76,34 @@ def test_evaluate_writes_table_figures_and_videos(run, tmp_path, monkeypatch, ca
     assert "| PPO |" in (tmp_path / "evaluation.md").read_text()
 
 
+def test_videos_show_the_scene_where_policies_differ_most_of_those_that_can_be_reached():
+    def result(errors, reached):
+        metrics = {"rmse_mn": np.array([errors]), "success": np.array([reached])}
+        return suite.Result(suite.Entry("PI", "CCR/LoadCell-v1", "ideal"), metrics, {})
+
+    results = [result([1.0, 2.0, 9.0], [1, 0, 0]), result([2.0, 5.0, 30.0], [0, 1, 0])]
+    assert suite.telling_scene(results) == 1
+    assert suite.telling_scene([result([1.0, 2.0], [0, 0]), result([9.0, 3.0], [0, 0])]) == 0
+
+
+@pytest.mark.parametrize(("steps", "shown"), [(64.0, "64"), (64.5, "never"), (65.0, "never")])
+def test_what_does_not_settle_never_does(steps, shown):
+    assert report.COLUMNS["settled [step]"]({"settling_step": steps, "steps": 64}) == shown
+
+
+def test_printed_tables_fit_80_columns_and_leave_out_what_is_empty(capsys):
+    metrics = {name: np.full((1, 3), 234.5) for name in METRICS}
+    extra = {"statuses": {"CONVERGED": 3}, "decisions_per_second": 1e3, "training_seconds": 0.0}
+    summary = suite.summarize(metrics) | extra
+    entries = [suite.Entry(policy, "CCR/PushObstacle-v1", "realistic") for policy in ("RecurrentPPO", "PI", "Oracle")]
+    by_id = report.group([suite.Result(entry, metrics, summary) for entry in entries])
+    report.show(by_id)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert any("RecurrentPPO" in line and "never" in line for line in lines)
+    assert "training" not in report.markdown(by_id)
+
+
 def test_every_policy_plays_the_same_scenes():
     first, second = (play(Entry(name, "CCR/LoadCell-v1", "realistic"), 1_000_000, 2) for name in ("P", "PI"))
     for a, b in zip(first.shown, second.shown, strict=True):
