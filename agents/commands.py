@@ -104,10 +104,10 @@ def evaluate(config: EvaluateConfig) -> None:
     if config.video:
         list(followed(suite.film_all(config, results), "film", len(results)))
     report.write(sorted(results, key=lambda result: entries.index(result.entry)), config)
-    print("Force error: root mean square after the search, as interquartile mean with its 95 % interval.")
+    print("Force error: root mean square after the search, interquartile mean [95 % interval].")
     baseline, bound = report.BASELINE, report.BOUND
-    print(f"closed: share of the gap from {baseline} to {bound}; * where the interval lies below that of {baseline}.")
-    print(f"Written: {config.out}/evaluation.json, evaluation.md, figures{' and videos' if config.video else ''}")
+    print(f"closed: share of the gap from {baseline} to {bound}; *: interval below that of {baseline}.")
+    print(f"Written: {config.out}/evaluation.json, evaluation.md (more columns), figures{' and videos' * config.video}")
 
 
 def retrain(config: RetrainConfig) -> None:

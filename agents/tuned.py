@@ -202,7 +202,7 @@ def tuned_gains(gains: Mapping[str, Mapping[str, GainsT]], env_id: str, sensing:
         ValueError: If nothing was tuned for the environment.
     """
     known = gains[tuned_for(env_id, sensing)] if isinstance(env_id, str) else {}
-    if env_id not in known:
+    if not isinstance(env_id, str) or env_id not in known:
         raise ValueError(f"env_id is {env_id!r:.80}; it must be one of {', '.join(gains['realistic'])}")
     return known[env_id]
 

@@ -95,7 +95,7 @@ def test_a_reversal_tells_the_loss(tmp_path):
     example = runpy.run_path(str(EXAMPLES / "probe.py"))
     args = example["Args"](episodes=40, out=tmp_path / "probe.png")
     alone, reversed_once = (example["play"](args, probing=probing) for probing in (False, True))
-    for k, ratio in ((0, 0.5), (1, 0.9)):  # errors of the loss, and of the force
+    for k, ratio in ((0, 0.5), (1, 0.95)):  # errors of the loss, and of the force
         assert np.median(reversed_once[k][-16:]) < ratio * np.median(alone[k][-16:])
     example["main"](args)
     assert args.out.stat().st_size > 10_000

@@ -107,6 +107,8 @@ GOOD = {
     "solver.free_motion": {"robot": ROBOT, "cable_mm": np.array([3.0]), "length_mm": np.array([180.0])},
     "solver.free_nodes": FREE,
     "solver.free_tension": FREE,
+    "solver.natural_frequency": {"robot": ROBOT, "mass_per_length": 0.05},
+    "solver.quasi_static_rate": {"robot": ROBOT, "mass_per_length": 0.05},
     "solver.onset_tension": {"before": SOLVER.rest(), "now": PULLED},
     "solver.point_forces": {"equilibrium": PULLED},
     "solver.sensitivity": {"equilibrium": PULLED},
@@ -166,13 +168,15 @@ GOOD |= {f"ccr_gym.{name}": {} for name in ENVS | TASKS | RANGES}
 GOOD["agents.ForceController.proportional_only"] = GOOD["agents.NewtonController.knowing"] = {}
 GOOD |= {f"agents.{name}.tuned": {"env_id": ENV_ID} for name in ("ForceController",)}
 GOOD["ccr_gym.Scales.of"] = {"robot": ROBOT}
-# What holds results, has no arguments, is abstract or a protocol.
+# What holds results, has no arguments, is abstract or a protocol, or reads and writes files with checks of their own.
 UNCHECKED = {
     *("solver.Actuation", "solver.Extent", "solver.Motion", "solver.Optimality", "solver.Residuals", "solver.Rows"),
     *("solver.RigidityFit", "solver.Sensitivity", "solver.Status", "solver.Trace", "solver.Transmission"),
     *("solver.Obstacle", "solver.held_signals", "solver.spatial.SpatialObstacle", "solver.spatial.SpatialSensitivity"),
     *("ccr_gym.ActionSpec", "ccr_gym.Assignment", "ccr_gym.PrivilegedState", "ccr_gym.Scales", "ccr_gym.Task"),
     *("ccr_gym.register_envs", "ccr_gym.check_packages"),
+    *("agents.estimate_log", "agents.read_instruments", "agents.read_log", "agents.read_robot", "agents.read_scene"),
+    *("agents.robot_json", "agents.scene_json"),
     *("agents.Episode", "agents.Knowledge", "agents.Metrics", "agents.Observation", "agents.Policy"),
 }
 

@@ -105,6 +105,8 @@ def closed(result: Result, rivals: list[Result]) -> float | None:
     errors = {r.entry.policy: float(r.summary["rmse_iqm_mn"]) for r in rivals}
     if BOUND not in errors or BASELINE not in errors or errors[BASELINE] < SHOWN:
         return None
+    if errors[BASELINE] == errors[BOUND]:
+        return None
     return (errors[BASELINE] - float(result.summary["rmse_iqm_mn"])) / (errors[BASELINE] - errors[BOUND])
 
 

@@ -249,6 +249,8 @@ def shape_motion(robot: Robot, nodes: np.ndarray, cable_mm: np.ndarray, length_m
     cable_mm, length_mm = _check_measured(robot, cable_mm, length_mm)
     nodes = check_array("nodes", nodes, (..., robot.segments + 1, 3), -LARGEST, LARGEST, "finite")
     check_alike(nodes=nodes.shape[:-2], cable_mm=cable_mm.shape, length_mm=length_mm.shape)
+    robots = np.broadcast_shapes(nodes.shape[:-2], cable_mm.shape, length_mm.shape)
+    nodes = np.broadcast_to(nodes, (*robots, *nodes.shape[-2:]))
     ahead, angles = np.diff(nodes[..., :2], axis=-2), -np.diff(nodes[..., 2], axis=-1)
     length, pull = length_mm[..., None] / robot.segments, cable_mm[..., None] / robot.segments
     if robot.model == "rod":
