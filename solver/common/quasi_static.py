@@ -9,7 +9,7 @@ rotation that the cable prescribes only raises. Starting and stopping at the wor
 import math
 
 from solver.common.rod import AnyRod, bending_ratios
-from solver.common.validation import check_number, check_positive
+from solver.common.validation import check_instance, check_number, check_positive
 
 FIRST_ROOT = 1.8751040687119611  # smallest positive root of cos β cosh β = −1
 MASS_UNIT = 1e6  # N·mm² over kg/m·mm⁴, in 1/s²
@@ -24,7 +24,9 @@ def natural_frequency(robot: AnyRod, mass_per_length: float) -> float:
 
     Raises:
         ValueError: If the mass is not positive.
+        TypeError: If there is no robot.
     """
+    check_instance("robot", robot, AnyRod, "a robot has a frequency")
     mass = check_positive("mass_per_length", mass_per_length)
     stiffness = MASS_UNIT * float(bending_ratios(robot).min()) * robot.rigidity / mass
     return FIRST_ROOT**2 * math.sqrt(stiffness) / robot.longest_mm**2 / (2 * math.pi)
@@ -40,7 +42,9 @@ def quasi_static_rate(robot: AnyRod, mass_per_length: float, tip_error: float = 
 
     Raises:
         ValueError: If the mass is not positive, or the error not between 0 and 0.1.
+        TypeError: As :func:`natural_frequency`.
     """
+    frequency = natural_frequency(robot, mass_per_length)
     bound = "above 0 and at most 0.1, as larger errors are not small motions"
     error = check_number("tip_error", tip_error, math.nextafter(0.0, 1.0), 0.1, bound)
-    return error * robot.offset_mm * 2 * math.pi * natural_frequency(robot, mass_per_length)
+    return error * robot.offset_mm * 2 * math.pi * frequency

@@ -39,7 +39,7 @@ class Transmission:
             ValueError: If the loss is not from 0 to 0.9, or the number of cables is not a positive whole number.
         """
         bound = f"from 0 to {MOST_LOSS}"
-        if isinstance(loss, list | tuple) or getattr(loss, "ndim", 0):
+        if isinstance(loss, list | tuple) or (isinstance(loss, np.ndarray) and loss.ndim):
             losses = check_array("loss", loss, (..., -1), 0.0, MOST_LOSS, bound)
         else:
             losses = np.array(check_number("loss", loss, 0.0, MOST_LOSS, bound))
