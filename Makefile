@@ -36,7 +36,7 @@ docs: $(INSTALL)  ## the documentation, in build/docs; warnings are errors
 	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -q -W --keep-going -b html docs build/docs
 
 numbers: $(INSTALL)  ## numbers of README and docs, from the result files in docs/results
-	$(BIN)/python -m benchmarks.numbers $(NUMBERS)
+	$(BIN)/python -m benchmarks.pages $(NUMBERS)
 
 native: $(INSTALL)  ## tests of the kernel in C++ (needs doctest: apt-get install doctest-dev)
 	$(NATIVE) build/native

@@ -27,7 +27,7 @@ from agents.config import EVALUATION_SEED, POLICIES, EvaluateConfig
 from agents.environment import make_env
 from agents.policy import Observation
 from agents.tuned import LEARNERS, sensing_of
-from benchmarks import numbers
+from benchmarks import pages
 from benchmarks.evaluation_text import HEADROOM
 from ccr_gym import ENV_IDS, PrivilegedState
 
@@ -228,7 +228,7 @@ def write() -> None:
     (KEPT / "evaluation/videos").mkdir(parents=True, exist_ok=True)
     report.write(usual, EvaluateConfig(out=KEPT / "evaluation", episodes=EPISODES))
     numbers.take_evaluation(KEPT / "evaluation/evaluation.json")
-    numbers.write()
+    pages.write()
 
 
 def _kept_of(kind: str) -> list[Path]:

@@ -1,7 +1,7 @@
 """Write the numbers of README and docs from the result files in ``docs/results``.
 
 ``make numbers`` fills the blocks between ``<!-- numbers: name -->`` and ``<!-- /numbers -->``. New results are put into
-place first: ``python -m benchmarks.numbers --evaluation runs/evaluation/evaluation.json --bench runs/bench.json``.
+place first: ``python -m benchmarks.pages --evaluation runs/evaluation/evaluation.json --bench runs/bench.json``.
 ``python -m benchmarks.tables`` measures policies and the estimator, and does both.
 """
 

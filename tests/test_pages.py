@@ -8,27 +8,27 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))  # last, so that an installed package goes first
 
-from benchmarks import markdown, numbers
+from benchmarks import markdown, pages
 
 
 @pytest.mark.parametrize("page", numbers.PAGES, ids=lambda page: page.name)
 def test_page_shows_the_numbers_of_the_result_files(page):
     text = page.read_text()
-    assert numbers.fill(text, numbers.blocks()) == text, "run make numbers"
+    assert pages.fill(text, pages.blocks()) == text, "run make numbers"
 
 
 def test_every_block_is_on_a_page():
     shown = "".join(page.read_text() for page in numbers.PAGES)
-    assert [name for name in numbers.BLOCKS if f"<!-- numbers: {name} -->" not in shown] == []
+    assert [name for name in pages.BLOCKS if f"<!-- numbers: {name} -->" not in shown] == []
 
 
 def test_blocks_are_written_between_their_marks_and_nowhere_else():
     text = "a\n<!-- numbers: x -->\nold\n<!-- /numbers -->\nb\n<!-- numbers: y -->\n<!-- /numbers -->\nc\n"
     filled = "a\n<!-- numbers: x -->\n1\n<!-- /numbers -->\nb\n<!-- numbers: y -->\n2\n3\n<!-- /numbers -->\nc\n"
-    assert numbers.fill(text, {"x": "1", "y": "2\n3"}) == filled
-    assert numbers.fill(filled, {"x": "1", "y": "2\n3"}) == filled
+    assert pages.fill(text, {"x": "1", "y": "2\n3"}) == filled
+    assert pages.fill(filled, {"x": "1", "y": "2\n3"}) == filled
     with pytest.raises(ValueError, match="'y' names no block"):
-        numbers.fill(text, {"x": ""})
+        pages.fill(text, {"x": ""})
 
 
 @pytest.mark.parametrize(
