@@ -222,12 +222,12 @@ def write() -> None:
     results = [found for path in sorted(KEPT.glob("*-v1-*.pkl")) if isinstance(found := load(path), Result)]
     results.sort(key=lambda r: (list(ENV_IDS).index(r.entry.env_id), POLICIES.index(r.entry.policy)))
     usual = [r for r in results if r.entry.sensing == sensing_of(r.entry.env_id)]
-    numbers.save("headroom", headroom(results))
-    numbers.save("knowledge", [row for path in _kept_of("knowledge") for row in load(path) or ()])
-    numbers.save("cost_of_flags", [row for path in _kept_of("flags") if (row := load(path))])
+    pages.save("headroom", headroom(results))
+    pages.save("knowledge", [row for path in _kept_of("knowledge") for row in load(path) or ()])
+    pages.save("cost_of_flags", [row for path in _kept_of("flags") if (row := load(path))])
     (KEPT / "evaluation/videos").mkdir(parents=True, exist_ok=True)
     report.write(usual, EvaluateConfig(out=KEPT / "evaluation", episodes=EPISODES))
-    numbers.take_evaluation(KEPT / "evaluation/evaluation.json")
+    pages.take_evaluation(KEPT / "evaluation/evaluation.json")
     pages.write()
 
 

@@ -11,14 +11,14 @@ sys.path.append(str(Path(__file__).parents[1]))  # last, so that an installed pa
 from benchmarks import markdown, pages
 
 
-@pytest.mark.parametrize("page", numbers.PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", pages.PAGES, ids=lambda page: page.name)
 def test_page_shows_the_numbers_of_the_result_files(page):
     text = page.read_text()
     assert pages.fill(text, pages.blocks()) == text, "run make numbers"
 
 
 def test_every_block_is_on_a_page():
-    shown = "".join(page.read_text() for page in numbers.PAGES)
+    shown = "".join(page.read_text() for page in pages.PAGES)
     assert [name for name in pages.BLOCKS if f"<!-- numbers: {name} -->" not in shown] == []
 
 
@@ -40,9 +40,9 @@ def test_significant_digits(value, count, text):
 
 
 def test_new_results_are_taken_without_their_episodes(tmp_path, monkeypatch):
-    monkeypatch.setattr(numbers, "RESULTS", tmp_path)
-    monkeypatch.setattr(numbers, "PAGES", ())
-    monkeypatch.setattr(numbers, "blocks", dict)
+    monkeypatch.setattr(pages, "RESULTS", tmp_path)
+    monkeypatch.setattr(pages, "PAGES", ())
+    monkeypatch.setattr(pages, "blocks", dict)
     result = {
         "policy": "PI",
         "env_id": "CCR/LoadCell-v1",
@@ -54,7 +54,7 @@ def test_new_results_are_taken_without_their_episodes(tmp_path, monkeypatch):
     path = tmp_path / "new.json"
     path.write_text(json.dumps(found))
     monkeypatch.setattr(sys, "argv", ["numbers", "--evaluation", str(path)])
-    numbers.main()
-    (kept,) = numbers.load("evaluation")["results"]
+    pages.main()
+    (kept,) = pages.load("evaluation")["results"]
     assert kept["summary"] == {"rmse_iqm_mn": 1.234568, "statuses": {"SNAPPED": 1}}
     assert "episodes" not in kept
