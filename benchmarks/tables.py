@@ -145,6 +145,19 @@ def headroom(results: Sequence[Result]) -> list[Row]:
     return rows
 
 
+def reversed_once(
+    seen: Observation, known: Knowledge, settings: Any, phase: np.ndarray, spent: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Return speeds that pull, reverse once and then regulate the force, with their phases and the steps in these."""
+    touching = seen["contact"].any(axis=1)
+    on = ((phase == 0) & ((spent > 8) | touching)) | ((phase == 1) & (spent > 4))
+    on |= (phase == 2) & touching & (spent > 5)
+    phase, spent = phase + on, np.where(on, 0, spent)
+    goal = settings.force_span * np.linalg.norm(seen["desired_force"], axis=1)
+    drive = np.where(touching, np.clip(0.4 * (goal - known.force), -1, 1), 0.4)
+    return np.choose(phase, [1.0, -1.0, 1.0, drive]), phase, spent
+
+
 def knowledge(env_id: str, sensing: str) -> list[Row]:
     """Return errors of the estimator, and how often the truth is within two standard deviations.
 
@@ -158,13 +171,7 @@ def knowledge(env_id: str, sensing: str) -> list[Row]:
     known, rows = estimator.update(seen), []
     phase, spent = np.zeros(ROBOTS, int), np.zeros(ROBOTS, int)
     for step in range(1, min(envs.get_attr("spec")[0].max_episode_steps, STEPS[-1]) + 1):
-        touching, spent = seen["contact"].any(axis=1), spent + 1
-        on = ((phase == 0) & ((spent > 8) | touching)) | ((phase == 1) & (spent > 4))
-        on |= (phase == 2) & touching & (spent > 5)
-        phase, spent = phase + on, np.where(on, 0, spent)
-        goal = settings.force_span * np.linalg.norm(seen["desired_force"], axis=1)
-        drive = np.where(touching, np.clip(0.4 * (goal - known.force), -1, 1), 0.4)
-        speed = np.choose(phase, [1.0, -1.0, 1.0, drive])
+        speed, phase, spent = reversed_once(seen, known, settings, phase, spent + 1)
         seen, _, _, _, info = envs.step((speed[:, None] * search(seen)).astype(np.float32))
         known = estimator.update(seen)
         if step in STEPS:

@@ -6,6 +6,7 @@ import pytest
 
 from agents.estimation.robot import RobotEstimator
 from agents.policy import search
+from benchmarks.tables import reversed_once
 from ccr_gym import EXACT, FORCE_SPAN
 
 STEPS, COUNT = 64, 250
@@ -27,14 +28,7 @@ def probed(env_id, sensing, count=COUNT, seed=5, randomize=None, length=STEPS):
     phase, steps = np.zeros(count, int), np.zeros(count, int)
     wrong = []
     for _ in range(length):
-        touching = observation["contact"].any(axis=1)
-        steps += 1
-        on = ((phase == 0) & ((steps > 8) | touching)) | ((phase == 1) & (steps > 4))
-        on |= (phase == 2) & touching & (steps > 5)
-        phase, steps = phase + on, np.where(on, 0, steps)
-        goal = settings.force_span * np.linalg.norm(observation["desired_force"], axis=1)
-        regulating = np.where(touching, np.clip(0.4 * (goal - known.force), -1, 1), 0.4)
-        speed = np.choose(phase, [1.0, -1.0, 1.0, regulating])
+        speed, phase, steps = reversed_once(observation, known, settings, phase, steps + 1)
         observation, _, _, _, info = envs.step((speed[:, None] * search(observation)).astype(np.float32))
         known = estimator.update(observation)
         force = np.linalg.norm(info["force_true"], axis=1) / settings.scales.force_n

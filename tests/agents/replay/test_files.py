@@ -116,13 +116,18 @@ def test_what_is_wrong_with_a_robot_is_one_line(text, message, tmp_path):
     ],
 )
 def test_what_is_wrong_with_a_scene_is_one_line(text, message, tmp_path):
-    path = tmp_path / "scene.json"
+    assert message in refusal(read_scene, tmp_path / "scene.json", text)
+
+
+def refusal(read, path, text):
+    """Return what is said of a file that is refused: one line, which begins with its name."""
     path.write_text(text)
     with pytest.raises(UserError) as caught:
-        read_scene(path, Robot.prototype())
-    assert str(caught.value).startswith(str(path))
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
+        read(path, Robot.prototype())
+    said = str(caught.value)
+    assert said.startswith(str(path))
+    assert "\n" not in said
+    return said
 
 
 def test_sensing_is_given_in_millimetres_and_newtons(tmp_path):
@@ -148,8 +153,4 @@ def test_sensing_is_given_in_millimetres_and_newtons(tmp_path):
     ],
 )
 def test_what_is_wrong_with_sensing_is_one_line(text, message, tmp_path):
-    path = tmp_path / "sensing.json"
-    path.write_text(text)
-    with pytest.raises(UserError) as caught:
-        read_instruments(path, Robot.prototype())
-    assert message in str(caught.value)
+    assert message in refusal(read_instruments, tmp_path / "sensing.json", text)
