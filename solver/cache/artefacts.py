@@ -81,14 +81,17 @@ class ArtefactStore:
         return StoreStatistics(self._hits, self._builds, self._rebuilds, sum(size for _, size, _ in self._entries()))
 
     def _publish(self, key: str, build: Callable[[Path], None], suffix: str) -> Path:
-        """Build an entry in a folder of its own and move it into the store."""
+        """Build an entry, in a temporary folder where the store's cannot be written or is on a full disk."""
         try:
             _make_private(self._folder)
-            workspace = tempfile.TemporaryDirectory(dir=self._folder, prefix=".building-")
+            return self._build(key, build, suffix)
         except OSError as error:
             self._leave(f"cannot be written ({error.strerror})", "a writable folder")
-            workspace = tempfile.TemporaryDirectory(dir=self._folder, prefix=".building-")
-        with workspace as folder:
+            return self._build(key, build, suffix)
+
+    def _build(self, key: str, build: Callable[[Path], None], suffix: str) -> Path:
+        """Build an entry in a folder of its own and move it into the store."""
+        with tempfile.TemporaryDirectory(dir=self._folder, prefix=".building-") as folder:
             fresh = Path(folder, f"fresh{suffix}")
             build(fresh)
             fresh.chmod(PRIVATE)

@@ -30,13 +30,19 @@ def function_address(function: ca.Function) -> int:
     Its signature is that of CasADi's generated code, ``int f(const double**, double**, int*, double*, int)``.
 
     Raises:
-        RuntimeError: If there is no C compiler, it fails, or its output cannot be loaded.
+        RuntimeError: If there is no C compiler, it fails, or its output cannot be written or loaded.
     """
     source = _source(function)
     compiler = _compiler()
     version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
     key = artefact_key(source, ca.CasadiMeta.version(), shlex.join(compiler), version, " ".join(FLAGS))
-    library = _load(store().path(key, lambda path: _compile(compiler, source, path), ".so"))
+    try:
+        path = store().path(key, lambda path: _compile(compiler, source, path), ".so")
+    except OSError as error:
+        raise RuntimeError(
+            f"a compiled shape cannot be written ({error}); make room, or set CCR_GYM_CACHE to a folder that has it"
+        ) from error
+    library = _load(path)
     _LIBRARIES.append(library)
     address = ctypes.cast(getattr(library, function.name()), ctypes.c_void_p).value
     assert address is not None
@@ -90,5 +96,5 @@ def _compile(compiler: list[str], source: str, path: Path) -> None:
     input_path.write_text(source)
     command = [*compiler, *FLAGS, str(input_path), "-o", str(path), "-lm"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
-    if result.returncode != 0:
-        raise RuntimeError(f"{shlex.join(command)} failed:\n{result.stderr}")
+    if result.returncode != 0 or not path.is_file():
+        raise RuntimeError(f"{shlex.join(command)} failed:\n{result.stderr or 'it wrote no file'}")

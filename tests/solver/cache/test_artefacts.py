@@ -1,5 +1,6 @@
 """The store of compiled functions: sound, bounded, shared."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -74,6 +75,18 @@ def test_where_nothing_can_be_written_a_temporary_folder_serves(tmp_path):
     with pytest.warns(UserWarning, match="cannot be written"):
         assert store.path(KEY, write("law"), ".so").read_text() == "law"
     assert store.path(KEY, refuse, ".so").read_text() == "law"
+
+
+def test_on_a_full_disk_a_temporary_folder_serves(tmp_path):
+    def fill(path):
+        path.write_text("half")
+        if path.is_relative_to(tmp_path):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    store = ArtefactStore(tmp_path)
+    with pytest.warns(UserWarning, match="cannot be written .No space left"):
+        assert store.path(artefact_key("full"), fill, ".so").read_text() == "half"
+    assert list(tmp_path.iterdir()) == []
 
 
 PROCESS = """

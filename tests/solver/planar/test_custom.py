@@ -1,5 +1,7 @@
 """Shapes given as expressions: a custom ellipse is the ellipse, and a new shape is as exact as any."""
 
+import errno
+import os
 import re
 import shutil
 import subprocess
@@ -11,6 +13,8 @@ import numpy as np
 import pytest
 
 from solver import Custom, Ellipse, Family, ReferenceSolver, Robot, Scene, Solver, Status
+from solver.cache import compile
+from solver.cache.artefacts import ArtefactStore
 from solver.cache.compile import store
 from solver.common.robot import MODELS
 
@@ -68,12 +72,27 @@ def test_the_reference_solver_needs_no_compiler(monkeypatch):
     assert list(pulled(Robot.prototype(model="paper"), shape))[-1].nodes == pytest.approx(reference.nodes, abs=1e-6)
 
 
-def test_a_compiler_that_fails_is_named(monkeypatch):
-    monkeypatch.setenv("CC", "false")
-    with pytest.raises(RuntimeError, match=r"false .* failed"):
+@pytest.mark.parametrize(("command", "said"), [("false", ""), ("true", "it wrote no file")])
+def test_a_compiler_that_fails_is_named(monkeypatch, command, said):
+    monkeypatch.setenv("CC", command)
+    with pytest.raises(RuntimeError, match=rf"{command} .* failed:\n{said}"):
         Solver(
             Robot.prototype(model="paper"),
             Scene([egg(family=Family.trace(lambda point, _: point[0] ** 2 + point[1] ** 2 - 90), sizes=())]),
+        )
+
+
+@pytest.mark.filterwarnings("ignore:.*cannot be written")
+def test_a_disk_that_takes_nothing_is_named(monkeypatch):
+    def fail(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(compile, "store", ArtefactStore)
+    monkeypatch.setattr(compile, "_compile", fail)
+    with pytest.raises(RuntimeError, match=r"a compiled shape cannot be written .*No space left.* make room"):
+        Solver(
+            Robot.prototype(model="paper"),
+            Scene([egg(family=Family.trace(lambda p, _: p[0] ** 2 + p[1] ** 2 - 92), sizes=())]),
         )
 
 
