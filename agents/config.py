@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -16,6 +17,8 @@ from solver import PRESETS
 
 VALIDATION_SEED = 900_000  # training seeds lie below; learning curves use the seeds from here on
 VALIDATION_EPISODES = 64
+PER_CORE = 4  # processes, or threads of the solver, that this machine takes
+MAX_ENVS = 65_536  # that a vector environment takes
 CURVE_POINTS = 15  # of a training run
 EVALUATION_SEED = 1_000_000  # first seed of an evaluation
 
@@ -135,7 +138,8 @@ class RetrainConfig:
         _check_names("env_ids", self.env_ids, tuple(ENV_IDS))
         if not 0 < self.share <= 1:
             raise ValueError(f"share is {self.share}; it must be above 0 and at most 1")
-        _check_counts(self, "seeds", "jobs")
+        _check_counts(self, "seeds")
+        check_parallel("jobs", self.jobs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +170,8 @@ class EvaluateConfig:
     def __post_init__(self) -> None:
         _check_names("env_ids", self.env_ids, tuple(ENV_IDS))
         _check_names("policies", self.policies, POLICIES)
-        _check_counts(self, "episodes", "jobs")
+        _check_counts(self, "episodes")
+        check_parallel("jobs", self.jobs)
         if self.seed < EVALUATION_SEED:
             raise ValueError(f"seed is {self.seed}; it must be at least {EVALUATION_SEED}, beyond the training seeds")
 
@@ -280,6 +285,18 @@ def _check_counts(settings: object, *fields: str) -> None:
             raise ValueError(f"{name} is {value!r}; it must be a whole number of at least 1")
 
 
+def check_parallel(name: str, count: int) -> None:
+    """Refuse more processes or threads than this machine takes.
+
+    Raises:
+        ValueError: Naming the bound.
+    """
+    most = PER_CORE * (os.cpu_count() or 1)
+    if type(count) is not int or not 1 <= count <= most:
+        bounds = f"from 1 to {most}, {PER_CORE} for each core of this machine"
+        raise ValueError(f"{name} is {count!r}; it must be a whole number {bounds}")
+
+
 def _check_learner(learner: LearnerSettings) -> None:
     """Refuse settings of another type than their defaults, or out of range."""
     for name, value in asdict(learner).items():
@@ -290,6 +307,8 @@ def _check_learner(learner: LearnerSettings) -> None:
         if not (math.isfinite(value) and low <= value <= high):
             raise ValueError(f"{name} is {value}; it must be from {low} to {high}")
     _check_counts(learner, *(name for name, value in asdict(type(learner)()).items() if isinstance(value, int)))
+    if learner.envs > MAX_ENVS:
+        raise ValueError(f"envs is {learner.envs}; it must be a whole number from 1 to {MAX_ENVS}")
     _check_batch(learner)
 
 

@@ -1,5 +1,6 @@
 """Files that are either written completely or not at all, and locks on folders."""
 
+import contextlib
 import fcntl
 import os
 from collections.abc import Iterator
@@ -30,7 +31,8 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror or error}") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # it is not there, also on a disk that cannot be written
+            partial.unlink()
 
 
 def write_text(path: Path, text: str) -> None:

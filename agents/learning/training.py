@@ -8,7 +8,7 @@ from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 
-from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig
+from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig, check_parallel
 from agents.errors import UserError
 from agents.files import LOCK, PARTIAL, locked
 from agents.learning.actor import ACTOR, LearningCurve, TrainingRecord, export
@@ -34,11 +34,12 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
 
     Raises:
         UserError: If the folder holds anything but a run, a run with other settings or a damaged one; if another
-            process is training in it; if it cannot be written.
+            process is training in it; if it cannot be written; if this machine has not enough cores for the threads.
     """
     torch.set_num_threads(1)  # the fastest for networks this small
     if is_finished(config):
         return config.run
+    _check_threads(config.threads)
     config.run.mkdir(parents=True, exist_ok=True)
     with locked(config.run):
         if is_finished(config):  # by another process, in the meantime
@@ -52,6 +53,14 @@ def train(config: TrainConfig, progress: bool = True) -> Path:
         export(config.run / ACTOR, network, statistics, TrainingRecord(config, curve, run.seconds))
         delete(config.run, CHECKPOINT, PARTIAL + CHECKPOINT)
     return config.run
+
+
+def _check_threads(threads: int) -> None:
+    """Refuse more threads than this machine takes: not when a configuration is made, which may be of another one."""
+    try:
+        check_parallel("threads", threads)
+    except ValueError as error:
+        raise UserError(str(error)) from error
 
 
 def _start(config: TrainConfig) -> TrainingRun:

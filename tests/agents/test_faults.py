@@ -89,6 +89,13 @@ def test_what_cannot_be_used_is_named(arguments, words, tmp_path, monkeypatch, c
     assert Path("file").read_text() == "in the way"
 
 
+def test_more_threads_than_the_machine_takes_are_refused_before_anything_is_written(tmp_path, monkeypatch, capsys):
+    run = tmp_path / "run"
+    code, lines = called(monkeypatch, capsys, "train", "--run", run, "--threads", 100_000)
+    assert_one_line(code, lines, "threads is 100000; it must be a whole number from 1 to ", "for each core")
+    assert not run.exists()
+
+
 @pytest.mark.skipif(not Path("/sys").is_dir(), reason="no folder that refuses every user")
 @pytest.mark.parametrize("arguments", ["train --run", "evaluate --out", "sweep --out", "reproduce --out"])
 def test_a_folder_that_cannot_be_written_is_named(arguments, monkeypatch, capsys):
@@ -206,6 +213,16 @@ def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
         write_half()
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_cannot_be_written_is_named_by_the_file(tmp_path, monkeypatch):
+    def fail(path, *_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    for name in ("open", "unlink"):
+        monkeypatch.setattr(Path, name, fail)
+    with pytest.raises(UserError, match=r"/file.txt cannot be written: Read-only file system"):
+        write_text(tmp_path / "file.txt", "text")
 
 
 def test_a_run_that_is_killed_goes_on_from_its_checkpoint(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from agents import files
-from agents.config import TrainConfig
+from agents.config import MAX_ENVS, PER_CORE, TrainConfig
 from agents.environment import make_env
 from agents.errors import UserError
 from agents.files import locked
@@ -24,6 +24,7 @@ from agents.learning.pretrained import trained
 from agents.learning.tensors import read_tensors, write_tensors
 from agents.learning.training import is_finished, train
 from agents.tuned import DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings
+from ccr_gym import vector_env
 
 SMALL = {
     "PPO": PPOSettings(steps=1536, envs=4, rollout=64, batch_size=64, epochs=1, width=8),
@@ -417,6 +418,11 @@ def test_a_configuration_is_read_as_it_was_written(tmp_path, name):
     config.save(tmp_path / "config.json")
     assert TrainConfig.load(tmp_path / "config.json") == config
     assert json.loads(config.dumps())["learner"]["name"] == name
+
+
+def test_bounds_are_those_of_the_environments():
+    assert MAX_ENVS == vector_env.MAX_ENVS
+    assert PER_CORE == vector_env.THREADS_PER_CORE
 
 
 def test_training_seeds_end_where_validation_begins():
