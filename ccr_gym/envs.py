@@ -150,7 +150,7 @@ class SpatialPushEnv(TaskEnv):  # noqa: D101 - below
         SpatialPush(),
         "Push a sphere or a cylinder in space with a desired force.",
         "A sphere or a cylinder of random position and size stands anywhere around a cable-driven continuum robot "
-        "with two pairs of opposite cables (eq. 13). Pulling them bends the robot in any direction. The agent "
+        "with two pairs of opposite cables. Pulling them bends the robot in any direction. The agent "
         "commands increments of both pairs to hold a desired contact force. Pressed on its middle, a sphere lets the "
         'robot slip off to either side once the force is high enough. With `task={"force_vector": True}` the '
         "set-point is a force vector: `desired_force` and `force_error` have three components in [-1, 1], and the "

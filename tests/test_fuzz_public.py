@@ -15,6 +15,7 @@ from gymnasium.error import Error as GymnasiumError
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import agents
 import ccr_gym
 import solver
 from solver import Robot, Scene, spatial
@@ -44,6 +45,10 @@ PULLED = SOLVER.step(SOLVER.rest(), 7.0)
 SPATIAL_PULLED = SPATIAL_SOLVER.step(SPATIAL_SOLVER.rest(), (7.0, 1.0))
 MOTION = solver.free_motion(ROBOT, np.array(3.0), np.array(180.0))
 OVAL = solver.Family.trace(lambda point, sizes: (point[0] / sizes[0]) ** 2 + (point[1] / sizes[1]) ** 2 - 1, sizes=2)
+REPLAY = Path(__file__).parents[1] / "examples" / "estimate"
+REPLAYED = agents.read_robot(REPLAY / "robot.json")
+REPLAYED_SCENE = agents.read_scene(REPLAY / "scene.json", REPLAYED)
+LOG = agents.read_log(REPLAY / "log.csv", REPLAYED)
 OBSERVATION = ccr_gym.LoadCellEnv(obs_mode="dict").reset(seed=0)[0]
 PLANE = {"robot": ROBOT, "scene": SCENE}
 SPACE = {"robot": SPATIAL_ROBOT, "scene": SPATIAL_SCENE}
@@ -164,6 +169,18 @@ GOOD = {
 ENVS = {name for name in ccr_gym.__all__ if name.endswith("Env")} - {"ContactEnv", "ContactVectorEnv"}
 TASKS = {name.removesuffix("Env") for name in ENVS}
 RANGES = {"Randomization", "RewardWeights", "Sensing", "InsertionSettings", "Settings", "SpatialSettings"}
+GOOD |= {
+    "agents.estimate_log": {
+        **{"log": LOG.averaged(len(LOG.rows) // 8), "robot": REPLAYED, "scene": REPLAYED_SCENE},
+        **{"instruments": agents.read_instruments(None, REPLAYED), "name": "log"},
+    },
+    "agents.read_instruments": {"path": None, "robot": REPLAYED},
+    "agents.read_log": {"path": REPLAY / "log.csv", "robot": REPLAYED},
+    "agents.read_robot": {"path": REPLAY / "robot.json"},
+    "agents.read_scene": {"path": REPLAY / "scene.json", "robot": REPLAYED},
+    "agents.robot_json": {"robot": ROBOT},
+    "agents.scene_json": {"scene": SCENE},
+}
 GOOD |= {f"ccr_gym.{name}": {} for name in ENVS | TASKS | RANGES}
 GOOD["agents.ForceController.proportional_only"] = GOOD["agents.NewtonController.knowing"] = {}
 GOOD |= {f"agents.{name}.tuned": {"env_id": ENV_ID} for name in ("ForceController",)}
@@ -175,13 +192,16 @@ UNCHECKED = {
     *("solver.Obstacle", "solver.held_signals", "solver.spatial.SpatialObstacle", "solver.spatial.SpatialSensitivity"),
     *("ccr_gym.ActionSpec", "ccr_gym.Assignment", "ccr_gym.PrivilegedState", "ccr_gym.Scales", "ccr_gym.Task"),
     *("ccr_gym.register_envs", "ccr_gym.check_packages"),
-    *("agents.estimate_log", "agents.read_instruments", "agents.read_log", "agents.read_robot", "agents.read_scene"),
-    *("agents.robot_json", "agents.scene_json"),
     *("agents.Episode", "agents.Knowledge", "agents.Metrics", "agents.Observation", "agents.Policy"),
 }
 
 
-OTHERS = {"solver.Custom": ("shape",), "agents.SB3VecEnv": ("num_envs",)}  # further words that name what is wrong
+OTHERS = {"solver.Custom": ("shape",), "agents.SB3VecEnv": ("num_envs",)}
+OTHERS |= {
+    "agents.estimate_log": ("obstacle",),
+    "agents.read_log": ("column",),
+    "agents.read_scene": ("shape",),
+}  # further words that name what is wrong
 
 
 def listed():
@@ -222,6 +242,8 @@ def test_what_is_passed_works_or_is_refused_by_name(name):
             call(**{**good, argument: junk})
         except (ValueError, TypeError) as error:
             assert named(error, argument)  # noqa: PT017 - a result is right, too
+        except OSError:  # of a file that does not exist
+            assert argument == "path"
         except GymnasiumError:  # of an id that is not registered
             assert argument == "env_id"
 

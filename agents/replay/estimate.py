@@ -10,11 +10,12 @@ from agents.replay.correction import CORRECTION_ERROR, corrections
 from agents.replay.log import Log
 from agents.replay.model import AnyEquilibrium, Model, followed, positions
 from agents.replay.observations import check_commands, observations, settings_of
-from agents.replay.robots import AnyRobot
+from agents.replay.robots import AnyRobot, check_robot
 from agents.replay.seen import seen_shapes
 from agents.replay.sensing import Instruments
 from ccr_gym import Scales
 from solver import Scene
+from solver.common.validation import check_instance
 
 FORCE = ("force", "force_std")  # of agents.Knowledge
 
@@ -74,8 +75,15 @@ def estimate_log(log: Log, robot: AnyRobot, scene: Scene, instruments: Instrumen
         name: Name of the log, for messages.
 
     Raises:
+        TypeError: If an argument is of another class.
+        ValueError: If the log is not one of this robot.
         UserError: If cables contradict each other.
     """
+    check_robot(robot)
+    check_instance("log", log, Log, "read_log(path, robot) reads one")
+    log.check_fits(robot)
+    check_instance("scene", scene, Scene, "Scene([…])")
+    check_instance("instruments", instruments, Instruments, "read_instruments(path, robot) reads one")
     robot, scales = followed(robot), Scales.of(robot)
     commands = commands_mm(log, robot, name)
     check_commands(commands, log, robot, name)

@@ -6,16 +6,22 @@ from pathlib import Path
 from typing import Any
 
 from agents.errors import UserError
+from solver.common.validation import shown
 
 MOST_BYTES = 16 * 2**20  # of a file that is read; robots and scenes take a few kilobytes
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path | str) -> str:
     """Return the text of a file.
 
     Raises:
-        UserError: If it cannot be read, is too large, or is not UTF-8.
+        TypeError: If the path is none.
+        OSError: If the file cannot be read.
+        UserError: If it is too large, or is not UTF-8.
     """
+    if not isinstance(path, Path | str):
+        raise TypeError(f"path is {shown(path)}; it must be a Path or a string")
+    path = Path(path)
     try:
         if (size := path.stat().st_size) > MOST_BYTES:
             raise UserError(f"{path} has {size} bytes; at most {MOST_BYTES} are read")
@@ -24,7 +30,7 @@ def read_text(path: Path) -> str:
         raise UserError(f"{path} is not a text in UTF-8: {error.reason} at byte {error.start}") from error
 
 
-def read_json(path: Path) -> object:
+def read_json(path: Path | str) -> object:
     """Return the value of a JSON file: strict JSON, without repeated names and without NaN.
 
     Raises:

@@ -12,7 +12,7 @@ import numpy as np
 
 from agents.errors import UserError
 from agents.replay.json_files import read_text
-from agents.replay.robots import AnyRobot
+from agents.replay.robots import AnyRobot, check_robot
 from solver import Robot
 
 MOST_ROWS = 200_000
@@ -42,6 +42,20 @@ class Log:
     nodes: np.ndarray
     positions_mm: np.ndarray
 
+    def check_fits(self, robot: AnyRobot) -> None:
+        """Check that the log can be that of a robot.
+
+        Raises:
+            ValueError: If it has other cables, nodes or axes.
+        """
+        cables, last = self.cables_mm.shape[1], int(self.nodes.max(initial=0))
+        if cables != len(robot.cables) or last > robot.segments or self.positions_mm.shape[2] != len(_axes(robot)):
+            raise ValueError(
+                f"log has {cables} cables, {self.positions_mm.shape[2]} axes and node {last}; robot has "
+                f"{len(robot.cables)} cables, {len(_axes(robot))} axes and {robot.segments} segments: "
+                "read_log(path, robot) reads the log of a robot"
+            )
+
     def averaged(self, count: int) -> Self:
         """Return the log with the means of each ``count`` consecutive rows as one row; an incomplete rest is left out.
 
@@ -60,6 +74,10 @@ class Log:
         return replace(self, rows=self.rows[count - 1 :: count], time_s=time, **means)
 
 
+def _axes(robot: AnyRobot) -> str:
+    return "xy" if isinstance(robot, Robot) else "xyz"
+
+
 def cable_columns(robot: AnyRobot) -> tuple[list[str], list[str]]:
     """Return the names of the columns with displacements and tensions of a robot's cables."""
     count = len(robot.cables)
@@ -67,15 +85,18 @@ def cable_columns(robot: AnyRobot) -> tuple[list[str], list[str]]:
     return [f"cable{name}_mm" for name in names], [f"tension{name}_n" for name in names]
 
 
-def read_log(path: Path, robot: AnyRobot) -> Log:
+def read_log(path: Path | str, robot: AnyRobot) -> Log:
     """Return the log of a CSV file.
 
     Raises:
+        TypeError: If the robot or the path is none.
         UserError: If the header or a cell is not as documented, naming row and column.
     """
+    check_robot(robot)
+    path = Path(path) if isinstance(path, str) else path
     header, rows, numbers = _table(path)
     displacements, tensions = cable_columns(robot)
-    axes = "xy" if isinstance(robot, Robot) else "xyz"
+    axes = _axes(robot)
     nodes, positions = _position_columns(path, header, robot, axes)
     _check_header(path, header, [*displacements, *tensions], [name for group in positions for name in group])
     columns = {name: numbers[:, place] for place, name in enumerate(header)}

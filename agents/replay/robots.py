@@ -9,6 +9,7 @@ from typing import Any
 from agents.errors import UserError
 from agents.replay.json_files import check_names, check_object, read_json
 from solver import Cable, Load, Robot
+from solver.common.validation import shown
 from solver.spatial import SpatialRobot
 
 AnyRobot = Robot | SpatialRobot
@@ -17,7 +18,7 @@ PARTS: dict[str, type[Cable] | type[Load]] = {"cables": Cable, "loads": Load}  #
 NO_LIMIT = {"max_tension"}  # fields in which null stands for infinity
 
 
-def read_robot(path: Path) -> AnyRobot:
+def read_robot(path: Path | str) -> AnyRobot:
     """Return the robot of a JSON file.
 
     Raises:
@@ -58,6 +59,16 @@ def robot_of(value: object) -> AnyRobot:
     return kind(**values)
 
 
+def check_robot(robot: object) -> None:
+    """Check that an object is a robot.
+
+    Raises:
+        TypeError: If it is anything else.
+    """
+    if not isinstance(robot, AnyRobot):
+        raise TypeError(f"robot is {shown(robot)}; it must be a Robot or a SpatialRobot")
+
+
 def _decoded(name: str, value: object) -> object:
     if name in NO_LIMIT and value is None:
         return math.inf
@@ -78,7 +89,12 @@ def _part(kind: type[Cable] | type[Load], value: object, what: str) -> Cable | L
 
 
 def robot_json(robot: AnyRobot) -> str:
-    """Return the JSON of a robot, from which :func:`robot_of` makes an equal one."""
+    """Return the JSON of a robot, from which :func:`robot_of` makes an equal one.
+
+    Raises:
+        TypeError: If it is no robot.
+    """
+    check_robot(robot)
     space = "plane" if isinstance(robot, Robot) else "space"
     return json.dumps({"space": space, **changed_fields(robot)}, indent=2)
 

@@ -8,20 +8,23 @@ from typing import Any
 import solver
 from agents.errors import UserError
 from agents.replay.json_files import check_names, check_object, read_json
-from agents.replay.robots import AnyRobot, changed_fields
+from agents.replay.robots import AnyRobot, changed_fields, check_robot
 from solver import Obstacle, Robot, Scene, Solver, spatial
+from solver.common.validation import check_instance
 from solver.spatial import SpatialSolver
 
 PLANAR = ("Circle", "HalfPlane", "Ellipse", "Capsule", "Polygon")
 SPATIAL = ("Sphere", "HalfSpace", "Capsule", "Cylinder", "Box")
 
 
-def read_scene(path: Path, robot: AnyRobot) -> Scene:
+def read_scene(path: Path | str, robot: AnyRobot) -> Scene:
     """Return the scene of a JSON file, for a robot that must fit between its obstacles.
 
     Raises:
+        TypeError: If the robot or the path is none.
         UserError: If the file does not describe obstacles that the robot can be put among.
     """
+    check_robot(robot)
     planar = isinstance(robot, Robot)
     try:
         scene = scene_of(read_json(path), planar=planar)
@@ -70,8 +73,10 @@ def scene_json(scene: Scene) -> str:
     """Return the JSON of a scene, from which :func:`scene_of` makes an equal one.
 
     Raises:
+        TypeError: If it is no scene.
         ValueError: If an obstacle is a custom shape, which is an expression and not data.
     """
+    check_instance("scene", scene, Scene, "Scene([…])")
     for obstacle in scene:
         if type(obstacle).__name__ not in (*PLANAR, *SPATIAL):
             raise ValueError(f"{type(obstacle).__name__} cannot be written as JSON; take one of {PLANAR + SPATIAL}")

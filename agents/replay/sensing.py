@@ -7,7 +7,7 @@ from typing import Any
 
 from agents.errors import UserError
 from agents.replay.json_files import check_names, check_object, read_json
-from agents.replay.robots import AnyRobot
+from agents.replay.robots import AnyRobot, check_robot
 from ccr_gym import Scales, Sensing
 
 MOST_LOSS = 0.9
@@ -39,12 +39,14 @@ class Instruments:
     position_error_mm: float
 
 
-def read_instruments(path: Path | None, robot: AnyRobot) -> Instruments:
+def read_instruments(path: Path | str | None, robot: AnyRobot) -> Instruments:
     """Return the imperfections that a JSON file states, without one those of ``sensing="realistic"``.
 
     Raises:
+        TypeError: If the robot or the path is none.
         UserError: If the file states anything else.
     """
+    check_robot(robot)
     try:
         return instruments_of({} if path is None else read_json(path), robot)
     except UserError:

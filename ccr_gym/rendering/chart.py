@@ -48,7 +48,9 @@ def draw_axes(canvas: Canvas, frame: Frame, plot: Region, count: int, span: int)
         x = plot.left + (step - first) / span * plot.width
         canvas.box(x - 0.5, plot.bottom, 1, 4, PALETTE.muted)
         canvas.label(str(step), (x, plot.bottom + 13), PALETTE.muted, 0.5, LAYOUT.small_font)
-    canvas.label("step", (plot.right + 8, plot.bottom + 13), PALETTE.muted, 0, LAYOUT.small_font)
+    canvas.label(
+        "step", (plot.right + 18, plot.bottom + 13), PALETTE.muted, 0, LAYOUT.small_font
+    )  # beside the last one
 
 
 def step_ticks(first: int, span: int) -> list[int]:

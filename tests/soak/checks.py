@@ -211,8 +211,8 @@ def _is_same(case, other):
 def _reason(solver, taken, k, repeats=REPEATS):
     """Return why a step was given up on, "not looked at" where that takes repeats and there are to be none.
 
-    ``folded``: the branch ends, at once or after repeats, where a segment of the paper's models folds over. ``slack``:
-    without pretension the shape of the paper's model is undetermined. ``crossing``: the pulled cable of a pair changes
+    At once or after repeats, ``folded``: the branch ends where a segment of the paper's models folds over; ``slack``:
+    without pretension the shape of the paper's model is undetermined; ``crossing``: the pulled cable of a pair changes
     in contact, where the shape of the paper's model jumps. ``far``: the command exceeds the work of one step; each
     repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any more, and obstacles
     squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or draws it, or a cable of
@@ -228,13 +228,8 @@ def _reason(solver, taken, k, repeats=REPEATS):
         return reason
     if _holes_meet(state):
         return "holes meet"
-    near_zero = PRETENSION * robot.offset_mm
-    pulled = command_of(state)[:-1]
-    if robot.model == "paper" and isinstance(robot, Robot):
-        if pulled[0] < near_zero:
-            return "slack"
-    elif robot.model == "paper" and np.any((pulled * command[:-1] <= 0) & (np.abs(pulled) <= near_zero)):
-        return "crossing"
+    if near_zero := _near_zero(state, command):
+        return near_zero
     buckling = 12 * robot.rigidity * (robot.segments / state.length_mm) ** 2
     if robot.model == "rod" and reason == "work" and state.tensions.sum() > BUCKLED * buckling:
         return "buckled"
@@ -245,9 +240,22 @@ def _reason(solver, taken, k, repeats=REPEATS):
         return "far"
     if _trace(solver, state, command).reason == "folded":
         return "folded"
+    if near_zero := _near_zero(state, command):
+        return near_zero
     if _is_pinched(state, command):
         return "pinched"
     return "wedged" if is_wedged(state, command) else "unexplained"
+
+
+def _near_zero(state, command):
+    """Return what is wrong with a cable of the paper's models that is next to slack, an empty string where none is."""
+    robot, pulled = state.robot, command_of(state)[:-1]
+    near = np.abs(pulled) <= PRETENSION * robot.offset_mm
+    if robot.model != "paper":
+        return ""
+    if isinstance(robot, Robot):
+        return "slack" if near[0] else ""
+    return "crossing" if np.any((pulled * command[:-1] <= 0) & near) else ""
 
 
 def _repeated(solver, state, command, repeats):

@@ -12,7 +12,9 @@ from scipy.optimize import nnls
 
 CLOSED = 1e-9  # of the robot's length: a gap that is
 SMALL_CHANGE = 1e-6  # of the way to a command, for a difference quotient
-BALANCED = 1e-4  # of the slopes: of multipliers that balance each other; at ordinary contacts it is 0.06 and more
+BALANCED = (
+    1e-4  # of the slopes: ten times the bound of the kernel, in another norm; ordinary contacts have 0.06 and more
+)
 MEETING = 1e-6  # of a segment's length: distance of the holes of a cable that meet
 
 

@@ -107,3 +107,11 @@ def test_cables_that_contradict_each_other_are_named(cables, path):
     log = snake_log(path, (0, 0, 0, 0), cables)
     with pytest.raises(UserError, match=r"log, row 3, column cable_[01]_mm: .* contradicts the other cables"):
         commands_mm(log, SNAKE, "log")
+
+
+@pytest.mark.parametrize("other", [Robot.prototype(segments=9, between=2), SpatialRobot.prototype(), SNAKE])
+def test_a_log_of_another_robot_does_not_fit(path, other):
+    log = read(path, "cable_mm,tension_n,node_18_x_mm,node_18_y_mm\n0,0,0,180\n")
+    log.check_fits(ROBOT)
+    with pytest.raises(ValueError, match="node 18; robot has"):
+        log.check_fits(other)
