@@ -135,8 +135,8 @@ bool ModelContinuation<Model>::buckle_at(const Command& command) {
   return false;
 }
 
-// One iterate of the descent from `present_` to `trial_`, of at most a size, shortened until nothing is jumped over.
-// True at an equilibrium.
+// One iterate of the descent from `present_` to `trial_`, of at most a size, shortened until nothing is jumped over; by
+// the step of a definite Hessian where that of the present one leads nowhere. True at an equilibrium.
 template <class Model>
 bool ModelContinuation<Model>::descend_once(double cap, bool& moved) {
   moved = false;
@@ -144,7 +144,11 @@ bool ModelContinuation<Model>::descend_once(double cap, bool& moved) {
   for (int shortening = 0; shortening < kDescentShortenings; ++shortening, cap /= 4) {
     trial_ = present_;
     ++result_.iterations;
-    const NewtonResult found = newton_.descend_once(trial_, cap);
+    NewtonResult found = newton_.descend_once(trial_, cap, false);
+    if (!found.moved && !found.converged) {
+      trial_ = present_;
+      found = newton_.descend_once(trial_, cap, true);
+    }
     moved = found.moved;
     if (found.converged) return true;
     if (!moved || trial_is_close()) return false;

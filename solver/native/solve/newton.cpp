@@ -287,7 +287,7 @@ bool Newton<Model>::gaps_closed(const ActiveSet& active, double tolerance) const
 }
 
 template <class Model>
-NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
+NewtonResult Newton<Model>::descend_once(Iterate& at, double largest, bool definite) {
   NewtonResult result;
   if (!problem.evaluate(at)) return result;
   choose_test();
@@ -302,8 +302,8 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest) {
     if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;
   }
   ActiveSet target = at.active;
-  if (!qp_.solve(problem, kkt_, target, step_) &&  // not stable without a gap that it drops
-      !((flat || ++dropped_ > kFlat) && release_lowest(at, target))) {
+  if (definite || (!qp_.solve(problem, kkt_, target, step_) &&  // not stable without a gap that it drops
+                   !((flat || ++dropped_ > kFlat) && release_lowest(at, target)))) {
     target = at.active;
     if (!kkt_.counts_inertia || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
   }

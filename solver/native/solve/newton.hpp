@@ -46,8 +46,9 @@ class Newton {
   void begin_step() { factorizations_before_ = factorizations(); }
 
   // One iterate of a feasible descent. Where `at` is an equilibrium, returns `converged`; otherwise moves `at` to a
-  // feasible shape of no more energy, by a step of at most the size `largest`, and returns whether it `moved`.
-  NewtonResult descend_once(Iterate& at, double largest);
+  // feasible shape of no more energy, by a step of at most the size `largest`, and returns whether it `moved`. The
+  // energy falls along the step of a Hessian that is damped until it is definite, which is the shorter one.
+  NewtonResult descend_once(Iterate& at, double largest, bool definite);
 
   // Whether H is positive definite at the last iterate, not only on the tangent space of the active gaps.
   bool is_definite(const ActiveSet& active) {

@@ -70,6 +70,16 @@ SLIPS_OFF_A_SPRING = (
     ),
 )
 
+ROD = Robot.prototype(
+    **{"length_mm": 149.0, "length_range_mm": (100.0, 180.0), "max_cable_mm": 25.0},
+    **{"touch": ("backbone", "cable", "rim"), "between": 3, "disk_radius_mm": 8.0},
+)
+FED_INTO_A_CHANNEL = (
+    *(Circle(center=(-15.412, height), radius=5.335) for height in (61.248, 78.646, 96.045)),
+    *(Circle(center=(15.178, height), radius=5.335) for height in (66.583, 101.38, 136.176, 153.575)),
+    Circle(center=(30.531, 109.954), radius=7.507),
+)
+
 
 @pytest.mark.parametrize(
     ("robot", "scene", "commands"),
@@ -90,12 +100,14 @@ SLIPS_OFF_A_SPRING = (
             PULLED_OVER_A_CORNER,
             ((11.760266471349633, None), (12.321153669669558, None), (12.487393185968, None)),
         ),
+        (ROD, FED_INTO_A_CHANNEL, ((4.2, 100.0), (0.8, 158.6))),
         (LONG, SLIPS_OFF_A_SPRING, ((16.684440648566614, 174.86340406235342), (6.810434947841618, 176.34558792448638))),
     ],
     ids=[
         "no penalty shows that it is stable",
         "pegs hold it far from its free shape",
         "a step beyond a corner",
+        "a step along which the energy rises",
         "its segments shear one after another",
     ],
 )
