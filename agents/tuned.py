@@ -12,7 +12,7 @@ PI_GAINS: dict[str, Gains] = {  # action per EI/L² of change in the force error
         "CCR/PushObstacle-v1": (0.2, 0.5),  # 1.3 errs by 16 % less, and is unstable with ideal sensing
         "CCR/TrackForce-v1": (0.6, 2.0),
         "CCR/BracedPush-v1": (0.2, 0.8),
-        "CCR/SoftObstacle-v1": (1.2, 2.0),
+        "CCR/SoftObstacle-v1": (0.6, 1.2),
         "CCR/MovingObstacle-v1": (1.2, 1.2),
         "CCR/InsertAndPush-v1": (0.2, 0.8),
         "CCR/SpatialPush-v1": (0.2, 0.8),
@@ -22,7 +22,7 @@ PI_GAINS: dict[str, Gains] = {  # action per EI/L² of change in the force error
         "CCR/PushObstacle-v1": (0.2, 3.2),
         "CCR/TrackForce-v1": (1.2, 2.0),
         "CCR/BracedPush-v1": (0.6, 3.2),
-        "CCR/SoftObstacle-v1": (0.2, 3.2),
+        "CCR/SoftObstacle-v1": (1.2, 2.0),
         "CCR/MovingObstacle-v1": (0.2, 2.0),
         "CCR/InsertAndPush-v1": (0.6, 0.8),
         "CCR/SpatialPush-v1": (0.6, 3.2),
@@ -39,7 +39,7 @@ P_GAINS: dict[str, dict[str, float]] = {  # action per EI/L² of force error
         "CCR/PushObstacle-v1": 0.5,  # likewise
         "CCR/TrackForce-v1": 2.0,
         "CCR/BracedPush-v1": 0.8,
-        "CCR/SoftObstacle-v1": 2.0,
+        "CCR/SoftObstacle-v1": 1.0,
         "CCR/MovingObstacle-v1": 2.0,
         "CCR/InsertAndPush-v1": 0.8,
         "CCR/SpatialPush-v1": 0.8,

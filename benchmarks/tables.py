@@ -25,6 +25,7 @@ from agents.benchmark.statistics import iqm, iqm_interval
 from agents.benchmark.suite import Entry, Result
 from agents.config import EVALUATION_SEED, POLICIES, EvaluateConfig
 from agents.environment import make_env
+from agents.learning.pretrained import trained
 from agents.policy import Observation
 from agents.tuned import LEARNERS, sensing_of
 from benchmarks import pages
@@ -49,7 +50,7 @@ Row = dict[str, Any]
 class Args:
     """Measure what is missing in runs/tables, and write all tables."""
 
-    env_ids: tuple[str, ...] = IDS
+    env_ids: tuple[str, ...] = tuple(ENV_IDS)
     """Environments to measure; tables are written of all."""
     policies: tuple[str, ...] = POLICIES
     """Policies to measure."""
@@ -87,23 +88,15 @@ def load(path: Path) -> Any:
 
 
 def entries(args: Args) -> list[Entry]:
-    """Return the policies to play; learned ones with the sensing that they were trained with."""
+    """Return the policies to play: learned ones with the sensing that they were trained with, as all on the paper's."""
     configs = [
-        EvaluateConfig(env_ids=args.env_ids, policies=(policy,), sensing=sensing)
+        EvaluateConfig(env_ids=(env_id,), policies=(policy,), sensing=sensing)
         for policy in args.policies
-        for sensing in args.sensings
-        if policy not in LEARNERS or sensing == "realistic"
+        for env_id in args.env_ids
+        for sensing in (args.sensings if env_id in IDS else (sensing_of(env_id),))
+        if policy not in LEARNERS or (sensing == sensing_of(env_id) and trained(policy, env_id))
     ]
-    return [entry for config in configs for entry in _entries(config)]
-
-
-def _entries(config: EvaluateConfig) -> list[Entry]:
-    learned = config.policies[0] in LEARNERS
-    return [] if learned and not _trained(config) else suite.entries(config)
-
-
-def _trained(config: EvaluateConfig) -> bool:
-    return any((config.pretrained / config.policies[0]).glob("*"))
+    return [entry for config in configs for entry in suite.entries(config)]
 
 
 def played(entry: Entry) -> Result | None:

@@ -145,9 +145,11 @@ class SoftObstacle(PushObstacle):
 
     Attributes:
         spring: Range of the spring's stiffness, sampled uniformly in its logarithm [EI/L³].
+        force: Range of the set-point, that of the load cell; it moves the softest obstacle by up to 0.15 L [EI/L²].
     """
 
     spring: Range = checked((10.0, 350.0), check_range, low=SMALLEST)
+    force: Range = checked((0.2, 1.5), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
         """Return a circle on a spring and a set-point."""

@@ -7,7 +7,10 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))  # last, so that an installed package goes first
 
-from benchmarks import tables
+from agents.config import PRETRAINED
+from agents.learning.pretrained import SUFFIX, folder_name
+from agents.tuned import sensing_of
+from benchmarks import pages, tables
 from benchmarks.evaluation_text import headroom_table
 
 
@@ -34,3 +37,13 @@ def test_what_is_kept_is_measured_once(tmp_path, monkeypatch):
     with pytest.raises(KeyError):
         tables.kept("other", lambda: {}["missing"])
     assert not (tmp_path / "other.pkl").exists()
+
+
+def test_all_rows_of_the_docs_and_all_shipped_policies_are_measured():
+    found = {(e.policy, e.env_id, e.sensing) for e in tables.entries(tables.Args())}
+    shown = {(row["policy"], row["env_id"], row["sensing"]) for row in pages.load("evaluation")["results"]}
+    assert shown == {entry for entry in found if entry[2] == sensing_of(entry[1])}
+    headroom = {(p, row["id"], row["sensing"]) for row in pages.load("headroom") for p in row["errors"]}
+    assert headroom <= found
+    learned = {(policy, folder_name(env_id)) for policy, env_id, _ in found if policy in ("PPO", "Distilled")}
+    assert learned == {file.parts[-3:-1] for file in PRETRAINED.rglob(f"*{SUFFIX}")}

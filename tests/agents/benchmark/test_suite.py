@@ -2,6 +2,7 @@ import itertools
 import json
 import shutil
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import torch
 
 from agents import cli
 from agents.benchmark import report, suite
-from agents.benchmark.evaluate import METRICS, Episode, measure, scores
+from agents.benchmark.evaluate import METRICS, Episode, measure, run_episode, scores
 from agents.benchmark.suite import Entry, play
 from agents.benchmark.sweep import sweep
 from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
@@ -51,6 +52,14 @@ def test_the_metrics_of_a_known_episode():
     never = measure(episode(np.full(64, 0.2), cost=0.01))
     assert (never.success, never.settling_step, never.violations) == (0, 65, 64)
     assert never.cost_mn == pytest.approx(640)
+
+
+def test_seconds_are_cpu_time_of_the_policy_alone(monkeypatch):
+    clock = itertools.count()
+    monkeypatch.setattr(time, "process_time", lambda: next(clock))
+    (policy,) = Entry("Oracle", "CCR/LoadCell-Paper-v1", "ideal").load()
+    found = run_episode(policy, "CCR/LoadCell-Paper-v1", 0)
+    assert found.seconds == len(found.force) == next(clock) / 2
 
 
 @pytest.fixture(scope="module")
