@@ -3,8 +3,8 @@ import os
 import pytest
 from hypothesis import settings
 
-# The same examples on every run; `make soak` asks for others with --hypothesis-profile=default.
-settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+# The same examples on every run; `make soak` asks for others, and more, with --hypothesis-profile=default.
+settings.register_profile("repeatable", max_examples=50, derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
 
 

@@ -25,7 +25,7 @@ from agents.workers import worker_pool
 SMALL = [
     "ppo",
     "--steps",
-    "4096",
+    "1024",
     "--envs",
     "8",
     "--rollout",

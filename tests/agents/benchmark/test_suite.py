@@ -28,7 +28,7 @@ from agents.tuned import LEARNERS, PPOSettings, sensing_of
 from solver import Status
 
 SCORES = json.loads((PRETRAINED / "scores.json").read_text())
-SCENES = 12  # of the table that are played again
+SCENES = 8  # of the table that are played again
 SMALL = PPOSettings(steps=512, envs=4, rollout=32, batch_size=64, epochs=1, width=8)
 
 
@@ -295,8 +295,8 @@ def agrees(found, table):
     """Return whether at least a third of some scenes' errors are those of the table, to 1 %.
 
     In single precision another processor rounds differently. Most scenes do not care, but where a closed loop is on the
-    edge, as at a switch of the memory, it amplifies the last bit, up to twice the error: five of twelve scenes of one
-    policy, none of most. Errors of another policy agree by chance, at most one of twelve.
+    edge, as at a switch of the memory, it amplifies the last bit, up to twice the error: three of eight scenes of one
+    policy, none of most. Errors of another policy agree by chance, at most one of eight.
     """
     return np.mean(np.abs(found - table) <= 0.01 * np.abs(table) + 2e-3) >= 1 / 3
 

@@ -10,7 +10,7 @@ from ccr_gym import ENV_IDS
 @pytest.mark.parametrize("env_id", sorted(ENV_IDS))
 @pytest.mark.parametrize("kind", [ForceController.tuned, ForceController.proportional_only])
 def test_with_ideal_sensing_it_reaches_the_set_point(env_id, kind):
-    last = np.array([episode.error[-1] for episode in run_episodes(kind(env_id), env_id, seed=50, count=20)])
+    last = np.array([episode.error[-1] for episode in run_episodes(kind(env_id), env_id, seed=50, count=10)])
     median, share = 0.01, 0.8
     if "Track" in env_id:  # a set-point that it follows with a delay
         median, share = 0.15, 0.15

@@ -31,6 +31,7 @@ SMALL = {
     "RecurrentPPO": RecurrentPPOSettings(steps=1536, envs=4, rollout=64, batch_size=64, epochs=1, width=8, hidden=4),
     "SAC": SACSettings(steps=1536, envs=4, gradient_steps=1, batch_size=32, width=8),
 }
+IMITATION = DistilledSettings(steps=64, envs=2, rollout=4, gradient_steps=2, batch_size=8, width=8)
 
 
 @pytest.fixture(autouse=True)
@@ -242,7 +243,7 @@ def test_a_finished_run_stays_and_begins_again_if_asked(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "learner", [SMALL["PPO"], DistilledSettings(steps=64, envs=2, rollout=4)], ids=lambda s: s.name
+    "learner", [SMALL["PPO"], IMITATION], ids=lambda s: s.name
 )
 def test_only_the_event_files_of_the_run_are_deleted(tmp_path, monkeypatch, learner):
     monkeypatch.setattr(distillation, "VALIDATION_EPISODES", 2)
