@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solver import Cable, Circle, Load, Robot, Scene, Solver, Status
+from solver import Cable, Capsule, Circle, Ellipse, Load, Robot, Scene, Solver, Status
 from solver.spatial import SpatialRobot, SpatialSolver
 
 CIRCLE = Scene([Circle(center=(44, 104), radius=15)])
@@ -64,6 +64,76 @@ def test_a_motor_at_its_limit_lets_its_cable_out_while_another_pulls():
     assert pulled.cables_mm[0] == pytest.approx(6.0)
     assert pulled.tensions[1] <= 15
     assert worst_motor(pulled, np.array([6.0, stalled.cables_mm[1]])) < 2e-6
+
+
+SNAPS = [
+    (
+        Robot(
+            length_mm=18.0,
+            segments=18,
+            offset_mm=0.8,
+            rigidity=50.0,
+            max_tension=15.0,
+            between=1,
+            cables=(
+                Cable(end=8),
+                Cable(angle=math.pi, end=8),
+                Cable(offset_mm=0.48699609065305727),
+                Cable(angle=math.pi, offset_mm=0.22841475990863686),
+            ),
+        ),
+        [
+            Capsule(
+                start=(4.157833160246933, 18.41595810641984),
+                end=(2.908549591938397, 17.81231489813668),
+                radius=1.165208210762463,
+            )
+        ],
+        [
+            (-0.06285169091410282, 0.06285169091410282, 0.45577451986669737, -0.21377097173043266, 18.0),
+            (0.08702642885063708, -0.08702642885063708, 0.6063498710161583, -0.28439501438925824, 18.0),
+            (0.03017991317451999, -0.03017991317451999, 0.4629118358943021, -0.21711857216938327, 18.0),
+        ],
+    ),
+    (
+        Robot(
+            length_mm=1311.3226180252539,
+            segments=9,
+            offset_mm=80.0,
+            rigidity=500000.0,
+            max_tension=15.0,
+            length_range_mm=(1000.0, 1800.0),
+            between=1,
+            cables=(Cable(), Cable(angle=math.pi)),
+        ),
+        [
+            Ellipse(
+                center=(302.99935369478027, 1091.9190466220377),
+                radii=(120.88154251278115, 138.71342327958587),
+                axis=(-0.340334484390377, 0.9403044393890396),
+                spring=1.7155760861205547,
+            ),
+            Circle(center=(415.4391313408832, 859.9453700360573), radius=114.75274863659435, spring=8.330515053340376),
+        ],
+        [
+            (90.9803773837657, -100.07841512214227, 1000.0),
+            (91.98037738376567, -101.17841512214224, 1300.6923564088638),
+        ],
+    ),
+]
+
+
+@pytest.mark.parametrize(("robot", "obstacles", "commands"), SNAPS, ids=["let out", "fed"])
+def test_motors_that_a_snap_would_overload_let_their_cables_out_on_the_way(robot, obstacles, commands):
+    solver = Solver(robot, Scene(obstacles))
+    state = solver.rest()
+    for command in commands:
+        state = solver.step(state, command[:-1], command[-1])
+    assert state.status is Status.STALLED
+    assert state.length_mm == command[-1]
+    assert worst_motor(state, np.array(command[:-1])) < 2e-6
+    assert state.factorizations < 1000
+    assert max(solver.optimality(state)) < 1e-9
 
 
 def test_two_cables_of_one_direction_yield_to_the_weight_at_rest():

@@ -131,6 +131,7 @@ class ContactProblem {
   // follows the shape, and the cable is a load of the robot and no longer one of its gaps.
   void keep_tension(int cable, double tension);
   bool keeps_tension(int cable) const { return kept_tensions_[cable] < HUGE_VAL; }
+  const Tensions& kept_tensions() const { return kept_tensions_; }  // infinite for motors that hold a length
   double kept_multiplier(int cable) const { return kept_multipliers_[cable]; }
   bool keeps_tensions() const { return keeps_tensions_; }  // of any cable
 

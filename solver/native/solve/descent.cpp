@@ -10,15 +10,21 @@ namespace ccr {
 using namespace tolerances;
 
 // Descends from `present_`, whose branch ends within the smallest step, to a stable equilibrium under a command part of
-// the way to this one; back to `present_` where there is none, or where the motor would have to hold too much.
+// the way to this one; back to `present_` where there is none, or where the motor would have to hold too much: several
+// motors let their cables out on the way then. Those that keep their tension pull their cables in up to a ceiling.
 template <class Model>
-ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command) {
+ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command, Command ceiling) {
   const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
   const bool lets_out = Model::kRod && layout_.cables.size == 1 && !pulls_cable(command) &&
                         pull(command, 0) < pull(present_.command, 0);  // whatever the base does
-  const bool motor_holds = !loading && !lets_out && !only_releases(command) && !moves_obstacles(command);
+  motors_yield_ = Model::kRod && (layout_.cables.size > 1 || problem_.keeps_tensions());
+  const bool motor_holds =
+      !motors_yield_ && !loading && !lets_out && !only_releases(command) && !moves_obstacles(command);
   const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
+  descent_kept_ = problem_.kept_tensions();
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (problem_.keeps_tension(k) && command.cables[k] < present_.command.cables[k]) hold_length(k);
   if (!bends_evenly_ && !problem_.touches_obstacle(present_.active)) {
     before_contact_ = present_;
     at_contact_ = command;
@@ -33,16 +39,73 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   for (int i = 0; i < kIterations && moved && !work_is_spent(); ++i) {
     std::swap(present_, trial_);
     record_shape();
-    const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton();
+    if (hold_beyond(ceiling) && !newton_.set_metric(present_)) break;
+    const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton(ceiling);
     const bool strides = !Model::kRod && i >= kLongDescent;
-    const bool ended = finished || descend_once(strides ? kDescentStride : kDescentCap, moved);
+    const bool ended = finished || descend_once(strides ? kDescentStride : kDescentCap, ceiling, moved);
     folded = !finished && problem_.in_barrier();
     if (!ended) continue;
-    if (folded && !try_newton()) break;
+    if (folded && !try_newton(ceiling)) break;
+    if (hold_beyond(ceiling) || yield_at_limit(ceiling)) {
+      trial_ = present_;
+      moved = newton_.set_metric(present_);
+      continue;
+    }
     return finish_descent(motor_holds, held);
   }
   result_.reason = work_is_spent() ? Reason::kWork : folded ? Reason::kFolded : Reason::kStuck;
   return undo_descent(End::kStuck);
+}
+
+// The energy at the shape at which the problem is evaluated, with that of motors which keep their tension up to a
+// ceiling, beyond which their cables are slack [rad²].
+template <class Model>
+double ModelContinuation<Model>::energy_below(const Command& ceiling) const {
+  double energy = problem_.energy();
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (problem_.keeps_tension(k))
+      energy += problem_.kept_multiplier(k) * std::max(problem_.taken(k), ceiling.cables[k]);
+  return energy;
+}
+
+// Lets motors hold their cables at an iterate of a descent, `present_`, that keep their tension, and whose cables have
+// come in beyond a ceiling: they are slack there, or soon taut again. False where there are none.
+template <class Model>
+bool ModelContinuation<Model>::hold_beyond(const Command& ceiling) {
+  bool holds = false;
+  if constexpr (Model::kRod)
+    for (int k = cable_beyond(ceiling); k >= 0; k = cable_beyond(ceiling)) {
+      problem_.keep_tension(k, HUGE_VAL);
+      present_.command.cables[k] = ceiling.cables[k];
+      holds = true;
+    }
+  return holds;
+}
+
+// Lets the motor keep the limit at the end of a descent, `present_`, that would have to hold most beyond it, up to
+// where its cable is: one by one, as those that pull against each other relieve each other. The tensions of an iterate
+// that is no equilibrium, where steps are damped, mean nothing. False where there is none.
+template <class Model>
+bool ModelContinuation<Model>::yield_at_limit(Command& ceiling) {
+  if constexpr (Model::kRod) {
+    ActiveSet& active = present_.active;
+    double most = problem_.robot().max_tension / problem_.energy_scale();
+    int place = -1;
+    for (int j = 0; j < active.count && motors_yield_; ++j) {
+      const int contact = active.contact[j];
+      if (!problem_.is_slack(contact) || active.multiplier[j] <= most || let_out_[contact - problem_.contacts()])
+        continue;
+      most = active.multiplier[j];
+      place = j;
+    }
+    if (place < 0) return false;
+    const int cable = active.contact[place] - problem_.contacts();
+    ceiling.cables[cable] = present_.command.cables[cable];
+    problem_.keep_tension(cable, below_limit());
+    active.drop(place);
+    return true;
+  }
+  return false;
 }
 
 template <class Model>
@@ -55,13 +118,13 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
     result_.reason = Reason::kStuck;
     return undo_descent(End::kStuck);
   }
-  const bool unwinds = problem_.keeps_tensions() && unwound_cable() >= 0;
-  if (highest(tensions_) > problem_.robot().max_tension || (unwinds && motor_holds)) {
-    if (motor_holds) {
+  const bool unwinds = (motor_holds || motors_yield_) && problem_.keeps_tensions() && unwound_cable() >= 0;
+  if (highest(tensions_) > problem_.robot().max_tension || unwinds) {
+    if (motor_holds || unwinds) {
       over_limit_ = tensions_;
       return undo_descent(End::kOverTension);
     }
-    if (held) keep_last_held(descent_start_, descent_trace_);
+    if (held) keep_last_held(descent_start_, descent_kept_, descent_trace_);
   }
   if (problem_.keeps_tensions()) follow_lengths(present_.command);
   double farthest = 0;
@@ -73,6 +136,9 @@ ModelContinuation<Model>::End ModelContinuation<Model>::finish_descent(bool moto
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::undo_descent(End end) {
   problem_.enable_barrier(false);
+  if constexpr (Model::kRod)
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+      if (problem_.kept_tensions()[k] != descent_kept_[k]) problem_.keep_tension(k, descent_kept_[k]);
   present_ = descent_start_;
   points_ = descent_points_;
   mounts_ = descent_mounts_;
@@ -135,12 +201,14 @@ bool ModelContinuation<Model>::buckle_at(const Command& command) {
   return false;
 }
 
-// One iterate of the descent from `present_` to `trial_`, of at most a size, shortened until nothing is jumped over; by
-// the step of a definite Hessian where that of the present one leads nowhere. True at an equilibrium.
+// One iterate of the descent from `present_` to `trial_`, of at most a size, shortened until nothing is jumped over,
+// and no cable comes in so far beyond its ceiling that energy is gained; by the step of a definite Hessian where that
+// of the present one leads nowhere. True at an equilibrium.
 template <class Model>
-bool ModelContinuation<Model>::descend_once(double cap, bool& moved) {
+bool ModelContinuation<Model>::descend_once(double cap, const Command& ceiling, bool& moved) {
   moved = false;
-  if (is_interrupted()) return false;
+  if (is_interrupted() || !problem_.evaluate(present_)) return false;
+  const double before = energy_below(ceiling);
   for (int shortening = 0; shortening < kDescentShortenings; ++shortening, cap /= 4) {
     trial_ = present_;
     ++result_.iterations;
@@ -151,7 +219,9 @@ bool ModelContinuation<Model>::descend_once(double cap, bool& moved) {
     }
     moved = found.moved;
     if (found.converged) return true;
-    if (!moved || trial_is_close()) return false;
+    if (!moved) return false;
+    const bool shortest = shortening == kDescentShortenings - 1;
+    if (trial_is_close() && (shortest || cable_beyond(ceiling) < 0 || energy_below(ceiling) < before)) return false;
   }
   moved = false;
   return false;
@@ -159,14 +229,14 @@ bool ModelContinuation<Model>::descend_once(double cap, bool& moved) {
 
 // The quadratic end of a descent: true where Newton's method stays close and loses energy.
 template <class Model>
-bool ModelContinuation<Model>::try_newton() {
+bool ModelContinuation<Model>::try_newton(const Command& ceiling) {
   const double energy = problem_.energy();
   trial_ = present_;
   problem_.enable_barrier(false);
   const NewtonResult found = newton_.solve(trial_, 0);
   problem_.enable_barrier(true);
   result_.iterations += found.iterations;
-  if (!found.converged || problem_.energy() > energy || !trial_is_close()) return false;
+  if (!found.converged || problem_.energy() > energy || cable_beyond(ceiling) >= 0 || !trial_is_close()) return false;
   std::swap(present_, trial_);
   record_shape();
   return true;
@@ -180,7 +250,7 @@ bool ModelContinuation<Model>::trial_is_close() const {
 }
 
 #define CCR_INSTANTIATE(Model) \
-  template ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command&);
+  template ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command&, Command);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

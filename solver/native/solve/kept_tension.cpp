@@ -124,12 +124,18 @@ bool ModelContinuation<Model>::raise_tension(int cable, double aim, double ceili
   return raised;
 }
 
+// The highest tension that a motor keeps, beyond which the rounding of a multiplier must not lead.
+template <class Model>
+double ModelContinuation<Model>::below_limit() const {
+  constexpr double kRounding = 1e-15;
+  return problem_.robot().max_tension * (1 - kRounding);
+}
+
 // Lets a motor keep its tension at `present_`, to which the cable is then a load.
 template <class Model>
 void ModelContinuation<Model>::keep_tension(int cable) {
   if constexpr (Model::kRod) {
-    constexpr double kRounding = 1e-15;  // of the multiplier, which must not lead beyond the limit
-    problem_.keep_tension(cable, std::min(tensions_[cable], problem_.robot().max_tension * (1 - kRounding)));
+    problem_.keep_tension(cable, std::min(tensions_[cable], below_limit()));
     ActiveSet& active = present_.active;
     for (int j = 0; j < active.count; ++j)
       if (active.contact[j] == problem_.slack_contact(cable)) active.drop(j--);
@@ -143,7 +149,7 @@ template <class Model>
 void ModelContinuation<Model>::hold_length(int cable) {
   if constexpr (Model::kRod) {
     evaluate_present();
-    add_kept_tension(cable, present_.active);
+    add_tension(cable, problem_.kept_multiplier(cable), present_.active);
     problem_.keep_tension(cable, HUGE_VAL);
     present_evaluated_ = false;
     evaluate_present();
@@ -171,14 +177,14 @@ double ModelContinuation<Model>::follow_tolerance() const {
 
 // Adds a cable whose motor keeps its tension to an active set: first, as those of a block are.
 template <class Model>
-void ModelContinuation<Model>::add_kept_tension(int cable, ActiveSet& active) const {
+void ModelContinuation<Model>::add_tension(int cable, double multiplier, ActiveSet& active) const {
   active.count = std::min(active.count + 1, kMaxActive);
   std::copy_backward(active.contact.begin(), active.contact.begin() + active.count - 1,
                      active.contact.begin() + active.count);
   std::copy_backward(active.multiplier.begin(), active.multiplier.begin() + active.count - 1,
                      active.multiplier.begin() + active.count);
   active.contact[0] = problem_.slack_contact(cable);
-  active.multiplier[0] = problem_.kept_multiplier(cable);
+  active.multiplier[0] = multiplier;
 }
 
 // Writes the lengths to which cables have followed the shape at which the problem is evaluated.
@@ -308,11 +314,13 @@ bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
   template void ModelContinuation<Model>::hold_length(int);                                                            \
   template bool ModelContinuation<Model>::is_met(const Command&, Status);                                              \
   template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
+  template double ModelContinuation<Model>::below_limit() const;                                                       \
   template void ModelContinuation<Model>::hold_lengths(const Command&);                                                \
-  template void ModelContinuation<Model>::add_kept_tension(int, ActiveSet&) const;                                     \
+  template void ModelContinuation<Model>::add_tension(int, double, ActiveSet&) const;                                  \
   template void ModelContinuation<Model>::follow_lengths(Command&) const;                                              \
   template void ModelContinuation<Model>::leave_kept(Command&) const;                                                  \
   template int ModelContinuation<Model>::unwound_cable() const;                                                        \
+  template int ModelContinuation<Model>::cable_beyond(const Command&) const;                                           \
   template ModelContinuation<Model>::Command ModelContinuation<Model>::ceiling(const Command&, const Command&, double) \
       const;                                                                                                           \
   template ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command&, Command);

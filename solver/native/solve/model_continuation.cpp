@@ -86,7 +86,8 @@ template <class Model>
 void ModelContinuation<Model>::accept() {
   update_trend();
   const double limit = problem_.robot().max_tension;
-  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit) keep_last_held(present_, recorded());
+  if (highest(tensions_) <= limit && highest(trial_tensions_) > limit)
+    keep_last_held(present_, problem_.kept_tensions(), recorded());
   if (problem_.keeps_tensions()) follow_lengths(trial_.command);
   keep_before_contact(trial_);
   std::swap(present_, trial_);
@@ -200,12 +201,14 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     // Cables that no limit stops buckle the robot, farther than roundoff in its energy hides.
     const bool buckles = conflict == Conflict::kBlocked && size < kPatientStep;
     const double part = buckles ? std::min(1.0, kPatientStep / remaining) : 0.0;
-    const End end = descend_from_end(buckles ? between(present_.command, goal, part) : next);
+    const End end = descend_from_end(buckles ? between(present_.command, goal, part) : next,
+                                     ceiling(pursuit.wanted, goal, size / remaining));
     if (end == End::kStuck) {
       const bool stopped = conflict == Conflict::kBlocked || is_blocked(next);
       return refine(pursuit, size, stopped || (moves_obstacles(next) && result_.reason == Reason::kStuck));
     }
     stalled = end == End::kOverTension;
+    if (problem_.keeps_tensions()) pursuit.reached = std::max(pursuit.reached, Status::kStalled);
     if (end == End::kSnapped) {
       pursuit.snapped = true;
       pursuit.reached = std::max(pursuit.reached, Status::kSnapped);

@@ -118,6 +118,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // Whether a shape continues the branch.
   bool try_free_shape();
   bool bend_freely();
+  bool rests_at(Iterate& one);
+  bool bend_segment(Iterate& one);
   bool meets_another_side() const;
   bool was_faced(int contact) const;
   double energy_loss(const Command& command) const;
@@ -147,7 +149,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool closes(const ActiveSet& holding, const Command& command);
   bool find_holding_set(const Command& command, ActiveSet& holding);
   std::size_t recorded() const { return shapes_ ? shapes_->size() : 0; }
-  void keep_last_held(const Iterate& held, std::size_t recorded);
+  void keep_last_held(const Iterate& held, const Tensions& kept, std::size_t recorded);
 
   // Motors at the limit that keep their tension.
   double highest_held(const Tensions& tensions) const;
@@ -160,11 +162,12 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool raise_kept_tensions(const Command& target);
   bool raise_tension(int cable, double aim, double ceiling);
   void keep_tension(int cable);
+  double below_limit() const;
   void hold_length(int cable);
   void hold_lengths(const Command& target);
   double follow_tolerance() const;
   bool pass_with_limit(const Command& target);
-  void add_kept_tension(int cable, ActiveSet& active) const;
+  void add_tension(int cable, double multiplier, ActiveSet& active) const;
   void follow_lengths(Command& command) const;
   void leave_kept(Command& goal) const;
   Command ceiling(const Command& wanted, const Command& goal, double part) const;
@@ -180,15 +183,18 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool raise_tensions(const ActiveSet& conflict);
 
   // The descent after the end of a branch.
-  End descend_from_end(const Command& command);
+  End descend_from_end(const Command& command, Command ceiling);
+  bool hold_beyond(const Command& ceiling);
+  bool yield_at_limit(Command& ceiling);
   End finish_descent(bool motor_holds, bool held);
   End undo_descent(End end);
   bool leave_towards(const Command& command);
   bool change_sides(const Command& command);
   bool restore_at(const Command& command, bool holding);
   bool buckle_at(const Command& command);
-  bool descend_once(double cap, bool& moved);
-  bool try_newton();
+  bool descend_once(double cap, const Command& ceiling, bool& moved);
+  bool try_newton(const Command& ceiling);
+  double energy_below(const Command& ceiling) const;
   bool trial_is_close() const;
 
   BlockLayout layout_;
@@ -232,6 +238,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Iterate descent_start_;          // where a descent began, and its points, mounts and recorded shapes
   std::vector<Position> descent_points_, descent_mounts_;
   std::size_t descent_trace_ = 0;
+  bool motors_yield_ = false;  // whether those that would have to hold more than the limit let their cables out on it
+  Tensions descent_kept_{};    // tensions that motors kept there
 };
 
 // The largest of some numbers.

@@ -36,6 +36,32 @@ StepResult ModelContinuation<Model>::rest(double length, double* to) {
   return result_;
 }
 
+// Whether no cable is too short for the shape of a segment without loads, which is left in `one`. Cables all around a
+// robot that are let out just so far have dependent slopes there, with which Newton's method finds no step.
+template <class Model>
+bool ModelContinuation<Model>::rests_at(Iterate& one) {
+  if (!Model::kRod || layout_.cables.size == 1) return false;
+  Control& control = one.controls[0];
+  std::copy_n(one_.rod.rest.begin(), Model::kControl, control.v.begin());
+  if (control.v == Control{}.v && highest(one.command.cables) > 0) return false;  // a straight one takes up nothing
+  return segment_.problem.evaluate(one) && segment_.problem.violation() <= kFeasibility * one_.max_length;
+}
+
+// Leaves in `one` the shape of a segment of the robot that nothing touches, as Newton's method finds it from `trial_`.
+template <class Model>
+bool ModelContinuation<Model>::bend_segment(Iterate& one) {
+  one.controls[0] = trial_.controls[0];
+  for (int j = 0; j < trial_.active.count; ++j)
+    if (const int contact = trial_.active.contact[j]; problem_.is_slack(contact)) {
+      one.active.contact[one.active.count] = contact - problem_.contacts();
+      one.active.multiplier[one.active.count++] = trial_.active.multiplier[j];
+    }
+  if (!segment_.solve(one, 0).converged || !segment_.is_definite(one.active)) return false;
+  const int cables = static_cast<int>(layout_.cables.size);
+  const auto begin = one.active.contact.begin(), end = begin + one.active.count;
+  return std::none_of(begin, end, [&](int contact) { return contact >= cables; });  // its disks do not meet
+}
+
 // Leaves in `trial_` the shape of the robot that nothing touches, where it bends alike in all segments: in closed form,
 // or as that of one segment. False where it does not, or would not stay so.
 template <class Model>
@@ -49,16 +75,8 @@ bool ModelContinuation<Model>::bend_freely() {
   Iterate& one = even_;
   for (int k = 0; k < cables; ++k) one.command.cables[k] = trial_.command.cables[k] / n;
   one.command.length = trial_.command.length / n;
-  one.controls[0] = trial_.controls[0];
   one.active.count = 0;
-  for (int j = 0; j < trial_.active.count; ++j)
-    if (const int contact = trial_.active.contact[j]; problem_.is_slack(contact)) {
-      one.active.contact[one.active.count] = contact - problem_.contacts();
-      one.active.multiplier[one.active.count++] = trial_.active.multiplier[j];
-    }
-  if (!segment_.solve(one, 0).converged || !segment_.is_definite(one.active)) return false;
-  const auto begin = one.active.contact.begin(), end = begin + one.active.count;
-  if (std::any_of(begin, end, [&](int contact) { return contact >= cables; })) return false;  // its disks meet
+  if (!rests_at(one) && !bend_segment(one)) return false;
   std::fill(trial_.controls.begin(), trial_.controls.end(), one.controls[0]);
   std::fill(trial_.mounts.begin(), trial_.mounts.end(), Position{});
   trial_.active = one.active;

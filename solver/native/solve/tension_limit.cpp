@@ -22,11 +22,12 @@ bool ModelContinuation<Model>::is_tight() const {
 }
 
 template <class Model>
-void ModelContinuation<Model>::keep_last_held(const Iterate& held, std::size_t recorded) {
+void ModelContinuation<Model>::keep_last_held(const Iterate& held, const Tensions& kept, std::size_t recorded) {
   last_held_ = held;
   last_held_trace_ = recorded;
-  for (int k = 0; problem_.keeps_tensions() && k < kCables; ++k)
-    if (problem_.keeps_tension(k)) add_kept_tension(k, last_held_.active);
+  for (int k = 0; Model::kRod && k < kCables; ++k)
+    if (kept[k] < HUGE_VAL)
+      add_tension(k, kept[k] / problem_.robot().energy_scale(held.command.length), last_held_.active);
   was_exceeded_ = true;
 }
 
@@ -206,17 +207,17 @@ bool ModelContinuation<Model>::closes(const ActiveSet& holding, const Command& c
   return weighted_gaps(trial_) < before;
 }
 
-#define CCR_INSTANTIATE(Model)                                                         \
-  template bool ModelContinuation<Model>::is_at_tension_limit() const;                 \
-  template bool ModelContinuation<Model>::is_tight() const;                            \
-  template void ModelContinuation<Model>::keep_last_held(const Iterate&, std::size_t); \
-  template bool ModelContinuation<Model>::gap_closed() const;                          \
-  template bool ModelContinuation<Model>::peaks_at_limit(const Command&, double);      \
-  template bool ModelContinuation<Model>::approach_tension_limit();                    \
-  template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;         \
-  template bool ModelContinuation<Model>::yield_cables(Command&, double) const;        \
-  template void ModelContinuation<Model>::wait_for_motors(Command&) const;             \
-  template bool ModelContinuation<Model>::is_unyielding() const;                       \
+#define CCR_INSTANTIATE(Model)                                                                          \
+  template bool ModelContinuation<Model>::is_at_tension_limit() const;                                  \
+  template bool ModelContinuation<Model>::is_tight() const;                                             \
+  template void ModelContinuation<Model>::keep_last_held(const Iterate&, const Tensions&, std::size_t); \
+  template bool ModelContinuation<Model>::gap_closed() const;                                           \
+  template bool ModelContinuation<Model>::peaks_at_limit(const Command&, double);                       \
+  template bool ModelContinuation<Model>::approach_tension_limit();                                     \
+  template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;                          \
+  template bool ModelContinuation<Model>::yield_cables(Command&, double) const;                         \
+  template void ModelContinuation<Model>::wait_for_motors(Command&) const;                              \
+  template bool ModelContinuation<Model>::is_unyielding() const;                                        \
   template bool ModelContinuation<Model>::is_blocked(const Command&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

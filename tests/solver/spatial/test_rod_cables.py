@@ -29,6 +29,19 @@ def test_cables_all_around_stall_at_the_tension_limit(count):
     assert free.nodes == pytest.approx(bent.nodes, abs=1e-7)
 
 
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_cables_all_around_that_are_released_let_the_robot_rest(count):
+    """At rest their slopes are dependent, and Newton's method finds no step."""
+    cables = tuple(Cable(angle=2 * math.pi * k / count) for k in range(count))
+    solver = SpatialSolver(SpatialRobot.prototype(model="rod", cables=cables), Scene())
+    bent = solver.step(solver.rest(), [0.25 * math.cos(cable.angle) for cable in cables])
+    released = solver.step(bent, count * [0.0])
+    assert released.status is Status.CONVERGED
+    assert released.factorizations == 0
+    assert not released.tensions.any()
+    assert np.array_equal(released.nodes, solver.rest().nodes)
+
+
 def test_cables_go_slack_on_a_robot_that_is_straight_then():
     cables = tuple(Cable(angle=math.pi / 2 * k) for k in range(4))
     solver = SpatialSolver(SpatialRobot.prototype(model="rod", cables=cables), Scene())
