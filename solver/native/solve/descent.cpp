@@ -213,7 +213,7 @@ bool ModelContinuation<Model>::descend_once(double cap, const Command& ceiling, 
     trial_ = present_;
     ++result_.iterations;
     NewtonResult found = newton_.descend_once(trial_, cap, false);
-    if (!found.moved && !found.converged) {
+    if (!found.moved && !found.converged && !problem_.in_barrier()) {
       trial_ = present_;
       found = newton_.descend_once(trial_, cap, true);
     }
