@@ -303,3 +303,27 @@ def test_cables_through_the_same_holes_stall_together(angles, command):
         assert worst_motor(state, command) < 2e-6
         assert max(solver.optimality(state)) < 1e-9
     assert often.nodes == pytest.approx(once.nodes, abs=1e-5 * robot.length_mm)
+
+
+def test_a_load_goes_over_to_the_cable_beside_that_is_let_out_a_little_less():
+    """Which of both holds it is not resolved in the smallest parts of the way."""
+    offsets = 0.6380095137318265, 0.6589530728663991, 0.6712696651734419, 0.7151570307259687, 0.7097536187655864
+    cables = tuple(Cable(angle=2 * math.pi * k / 3, offset_mm=offset) for k, offset in enumerate(offsets))
+    robot = SpatialRobot(
+        length_mm=18.0,
+        segments=18,
+        offset_mm=0.8,
+        rigidity=50.0,
+        max_tension=15.0,
+        torsion_ratio=1.5225191413837418,
+        cables=(*cables, Cable(angle=10 / 3 * math.pi, offset_mm=0.5620087480869443)),
+    )
+    solver = SpatialSolver(robot, Scene())
+    pulled = np.array([-2.05510381, -2.51327412, 2.51327412, -2.30360506, -2.51327412, 2.26620688])
+    released = np.array([-2.0355047, -1.67617808, 1.92456281, -2.28163603, -1.80539936, 1.61130644])
+    stalled = solver.step(solver.rest(), pulled)
+    assert stalled.tensions[[2, 5]].min() > 1  # both hold the robot
+    state = solver.step(stalled, released)
+    assert state.status is Status.CONVERGED
+    assert state.cables_mm == pytest.approx(released, abs=1e-9)
+    assert state.factorizations < 300

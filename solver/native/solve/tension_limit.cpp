@@ -64,8 +64,9 @@ bool ModelContinuation<Model>::approach_tension_limit() {
   };
   const Command start = present_.command, end = trial_.command;
   const double span = command_distance(start, end);
-  // Within which any of the cables that share a load may be taut, as their slack is not resolved.
-  const double hidden = 100 * kFeasibility * problem_.robot().max_length / problem_.robot().offset;
+  // Within which any of the cables that share a load may be taut, as their slack is not resolved: those in one
+  // direction slacken by thousandths of what they are let out.
+  const double hidden = 1e4 * kFeasibility * problem_.robot().max_length / problem_.robot().offset;
   double low = 0, high = 1;  // fractions of the way
   double excess = highest(trial_tensions_) - aim, shortage = approaching() - aim;
   Move last = Move::kRejected;
