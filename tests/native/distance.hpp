@@ -50,12 +50,19 @@ inline double ellipse_distance(const double* p, const Position<2>& point) {
   };
   constexpr int kParts = 72;
   int best = 0;
+  double nearest = distance(0);
   for (int k = 1; k < kParts; ++k)
-    if (distance(2 * std::numbers::pi * k / kParts) < distance(2 * std::numbers::pi * best / kParts)) best = k;
+    if (const double found = distance(2 * std::numbers::pi * k / kParts); found < nearest) {
+      nearest = found;
+      best = k;
+    }
   double low = 2 * std::numbers::pi * (best - 1) / kParts, high = 2 * std::numbers::pi * (best + 1) / kParts;
   for (int i = 0; i < 40; ++i) {
     const double first = low + (high - low) / 3, second = high - (high - low) / 3;
-    (distance(first) < distance(second) ? high : low) = distance(first) < distance(second) ? second : first;
+    if (distance(first) < distance(second))
+      high = second;
+    else
+      low = first;
   }
   const bool inside = along * along / (p[2] * p[2]) + across * across / (p[3] * p[3]) < 1;
   return inside ? -distance(low) : distance(low);

@@ -41,12 +41,23 @@ double sagitta(const Obstacle<D>& obstacle) {
   return 1.01 * longest * longest / (8 * obstacle.min_curvature_radius);
 }
 
+// How deep the deepest of some points on a line is, at least as deep as known already. As a distance changes no faster
+// than a point moves, points that cannot be deeper than the deepest so far are skipped.
+template <int D>
+double deepest_on_line(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to, int parts,
+                       double deepest = -kInfinity) {
+  const double spacing = norm(minus(to, from)) / parts;
+  for (int k = 0; k <= parts;) {
+    const double distance = signed_distance(obstacle, between(from, to, static_cast<double>(k) / parts));
+    deepest = std::max(deepest, -distance);
+    k += static_cast<int>(std::clamp(spacing > 0 ? (distance + deepest) / spacing : parts, 1.0, parts + 1.0));
+  }
+  return deepest;
+}
+
 template <int D>
 double deepest_of_path(const Obstacle<D>& obstacle, const Position<D>& from, const Position<D>& to) {
-  double deepest = -kInfinity;
-  for (int k = 0; k <= kPathParts; ++k)
-    deepest = std::max(deepest, -signed_distance(obstacle, between(from, to, static_cast<double>(k) / kPathParts)));
-  return deepest;
+  return deepest_on_line(obstacle, from, to, kPathParts);
 }
 
 template <int D>
@@ -55,8 +66,7 @@ double deepest_of_sweep(const Obstacle<D>& obstacle, const Edge<D>& from, const 
   for (int k = 0; k <= kMoments; ++k) {
     const double moment = static_cast<double>(k) / kMoments;
     const Position<D> start = between(from.start, to.start, moment), end = between(from.end, to.end, moment);
-    for (int i = 0; i <= kParts; ++i)
-      deepest = std::max(deepest, -signed_distance(obstacle, between(start, end, static_cast<double>(i) / kParts)));
+    deepest = deepest_on_line(obstacle, start, end, kParts, deepest);
   }
   return deepest;
 }
