@@ -242,9 +242,7 @@ def test_a_finished_run_stays_and_begins_again_if_asked(tmp_path):
     assert TrainConfig.load(tmp_path / training.CONFIG).seed == 5
 
 
-@pytest.mark.parametrize(
-    "learner", [SMALL["PPO"], IMITATION], ids=lambda s: s.name
-)
+@pytest.mark.parametrize("learner", [SMALL["PPO"], IMITATION], ids=lambda s: s.name)
 def test_only_the_event_files_of_the_run_are_deleted(tmp_path, monkeypatch, learner):
     monkeypatch.setattr(distillation, "VALIDATION_EPISODES", 2)
     config = TrainConfig(run=tmp_path, learner=learner, threads=1)
