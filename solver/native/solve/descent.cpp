@@ -11,19 +11,20 @@ using namespace tolerances;
 
 // Descends from `present_`, whose branch ends within the smallest step, to a stable equilibrium under a command part of
 // the way to this one; back to `present_` where there is none, or where the motor would have to hold too much: several
-// motors let their cables out on the way then. Those that keep their tension pull their cables in up to a ceiling.
+// motors let their cables out on the way then, and those that keep their tension pull their cables in up to a ceiling.
 template <class Model>
 ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const Command& command, Command ceiling) {
   const bool loading = command.loads != present_.command.loads;  // what the motors cannot hold then, they let out
   const bool lets_out = Model::kRod && layout_.cables.size == 1 && !pulls_cable(command) &&
                         pull(command, 0) < pull(present_.command, 0);  // whatever the base does
-  motors_yield_ = Model::kRod && (layout_.cables.size > 1 || problem_.keeps_tensions());
+  motors_yield_ = Model::kRod && layout_.cables.size > 1;
+  if (!motors_yield_) ceiling.cables.v.fill(HUGE_VAL);
   const bool motor_holds =
       !motors_yield_ && !loading && !lets_out && !only_releases(command) && !moves_obstacles(command);
   const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
   descent_kept_ = problem_.kept_tensions();
-  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+  for (int k = 0; motors_yield_ && k < static_cast<int>(layout_.cables.size); ++k)
     if (problem_.keeps_tension(k) && command.cables[k] < present_.command.cables[k]) hold_length(k);
   if (!bends_evenly_ && !problem_.touches_obstacle(present_.active)) {
     before_contact_ = present_;
