@@ -110,5 +110,5 @@ def test_a_robot_whose_disks_meet_at_a_corner_is_wedged():
     """Drawn back, it cannot bend on round the corner between two of its points: BLOCKED, as its closed gaps confirm."""
     tally, cases = play(Episode("rod", 1150, 1761, 500))
     assert {case["kind"] for case in cases} == {"blocked"}
-    assert tally.blocked >= 3  # which snaps lead into such places is not the point
+    assert tally.blocked == 3
     assert tally.blocked_unconfirmed == 0
