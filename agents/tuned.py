@@ -210,7 +210,8 @@ def tuned_gains(gains: Mapping[str, Mapping[str, GainsT]], env_id: str, sensing:
 def tuned_for(env_id: str, sensing: str | None) -> str:
     """Return the sensing for which an environment's controllers are tuned that is nearest to a given one."""
     usual = sensing_of(env_id)
-    return "sensorless" if (usual, sensing) == ("realistic", "sensorless") else usual
+    sensorless = isinstance(sensing, str) and sensing == "sensorless"
+    return "sensorless" if sensorless and usual == "realistic" else usual
 
 
 def sensing_of(env_id: str) -> Literal["ideal", "realistic"]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from agents.arguments import check_kind
 from agents.estimation.robot import Knowledge, RobotEstimator
 from agents.replay.commands import commands_mm
 from agents.replay.correction import CORRECTION_ERROR, corrections
@@ -15,7 +16,6 @@ from agents.replay.seen import seen_shapes
 from agents.replay.sensing import Instruments
 from ccr_gym import Scales
 from solver import Scene
-from solver.common.validation import check_instance
 
 FORCE = ("force", "force_std")  # of agents.Knowledge
 
@@ -80,10 +80,10 @@ def estimate_log(log: Log, robot: AnyRobot, scene: Scene, instruments: Instrumen
         UserError: If cables contradict each other.
     """
     check_robot(robot)
-    check_instance("log", log, Log, "read_log(path, robot) reads one")
+    check_kind("log", log, Log, "read_log(path, robot) reads one")
     log.check_fits(robot)
-    check_instance("scene", scene, Scene, "Scene([…])")
-    check_instance("instruments", instruments, Instruments, "read_instruments(path, robot) reads one")
+    check_kind("scene", scene, Scene, "it must be a Scene")
+    check_kind("instruments", instruments, Instruments, "read_instruments(path, robot) reads one")
     robot, scales = followed(robot), Scales.of(robot)
     commands = commands_mm(log, robot, name)
     check_commands(commands, log, robot, name)

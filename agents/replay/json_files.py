@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from agents.arguments import check_kind
 from agents.errors import UserError
-from solver.common.validation import shown
 
 MOST_BYTES = 16 * 2**20  # of a file that is read; robots and scenes take a few kilobytes
 
@@ -19,8 +19,7 @@ def read_text(path: Path | str) -> str:
         OSError: If the file cannot be read.
         UserError: If it is too large, or is not UTF-8.
     """
-    if not isinstance(path, Path | str):
-        raise TypeError(f"path is {shown(path)}; it must be a Path or a string")
+    check_kind("path", path, (Path, str), "it must be a Path or a string")
     path = Path(path)
     try:
         if (size := path.stat().st_size) > MOST_BYTES:

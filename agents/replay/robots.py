@@ -6,10 +6,10 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
+from agents.arguments import check_kind
 from agents.errors import UserError
 from agents.replay.json_files import check_names, check_object, read_json
 from solver import Cable, Load, Robot
-from solver.common.validation import shown
 from solver.spatial import SpatialRobot
 
 AnyRobot = Robot | SpatialRobot
@@ -65,8 +65,7 @@ def check_robot(robot: object) -> None:
     Raises:
         TypeError: If it is anything else.
     """
-    if not isinstance(robot, AnyRobot):
-        raise TypeError(f"robot is {shown(robot)}; it must be a Robot or a SpatialRobot")
+    check_kind("robot", robot, (Robot, SpatialRobot), "it must be a Robot or a SpatialRobot")
 
 
 def _decoded(name: str, value: object) -> object:

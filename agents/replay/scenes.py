@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import solver
+from agents.arguments import check_kind
 from agents.errors import UserError
 from agents.replay.json_files import check_names, check_object, read_json
 from agents.replay.robots import AnyRobot, changed_fields, check_robot
 from solver import Obstacle, Robot, Scene, Solver, spatial
-from solver.common.validation import check_instance
 from solver.spatial import SpatialSolver
 
 PLANAR = ("Circle", "HalfPlane", "Ellipse", "Capsule", "Polygon")
@@ -76,7 +76,7 @@ def scene_json(scene: Scene) -> str:
         TypeError: If it is no scene.
         ValueError: If an obstacle is a custom shape, which is an expression and not data.
     """
-    check_instance("scene", scene, Scene, "Scene([…])")
+    check_kind("scene", scene, Scene, "it must be a Scene")
     for obstacle in scene:
         if type(obstacle).__name__ not in (*PLANAR, *SPATIAL):
             raise ValueError(f"{type(obstacle).__name__} cannot be written as JSON; take one of {PLANAR + SPATIAL}")
