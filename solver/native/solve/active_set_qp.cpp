@@ -185,8 +185,8 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
 }
 
 template <class Model>
-int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const ActiveSet& active,
-                                      const Direction& step) const {
+int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step,
+                                      double tolerance) const {
   double reach = 0;  // bound on the motion of any point
   for (const auto& d : step.states) {
     double motion = 0, turn = 0;
@@ -202,7 +202,7 @@ int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const Activ
   }
   reach += shift;
   int worst = -1;
-  double lowest = -kFeasibility * problem.robot().max_length / 2;
+  double lowest = -tolerance * problem.robot().max_length / 2;
   for (const int c : problem.near_contacts()) {
     const double gap = problem.gaps()[c];
     if (gap > 2 * reach && c < problem.contacts()) continue;
@@ -217,12 +217,12 @@ int ActiveSetQp<Model>::most_violated(const ContactProblem& problem, const Activ
 }
 
 template <class Model>
-bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active,
-                                      Direction& step) {
+bool ActiveSetQp<Model>::satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step,
+                                      double tolerance) {
   conflict_.count = 0;
   if (!drop_negative_multipliers(problem, active, step)) return false;
   for (int change = 0; change < kActiveSetChanges; ++change) {
-    const int contact = most_violated(problem, active, step);
+    const int contact = most_violated(problem, active, step, tolerance);
     if (contact < 0) return true;
     if (!add_violated_gap(problem, kkt, contact, active, step)) return false;
   }
@@ -238,7 +238,7 @@ bool ActiveSetQp<Model>::solve(const ContactProblem& problem, KktSystem& kkt, Ac
   loads_[count++] = {nullptr, &step};
   kkt.solve(problem, std::span(loads_).first(count));
   add_penalty_response(problem, active, step);
-  return satisfy_gaps(problem, kkt, active, step);
+  return satisfy_gaps(problem, kkt, active, step, kFeasibility);
 }
 
 template <class Model>
@@ -248,7 +248,7 @@ bool ActiveSetQp<Model>::restore(const ContactProblem& problem, KktSystem& kkt, 
   std::fill_n(active.multiplier.begin(), active.count, kHeld);
   step.clear();
   kkt.solve(problem, std::span(loads_).first(active.count));
-  return satisfy_gaps(problem, kkt, active, step);
+  return satisfy_gaps(problem, kkt, active, step, kDescentFeasibility);
 }
 
 template <class Model>

@@ -62,11 +62,13 @@ class ActiveSetQp {
   Gram factor_gram(const ActiveSet& active);
   void solve_gram(int count, Multipliers& x) const;
   bool drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step);
-  bool satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
+  bool satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step,
+                    double tolerance);
   Multipliers closing_multipliers(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const;
   void apply(const Multipliers& change, ActiveSet& active, Direction& step) const;
   bool add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active, Direction& step);
-  int most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const;
+  int most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step,
+                    double tolerance) const;
 
   // Of the active gaps in their order, then of the one that is being added.
   std::vector<typename ContactProblem::Slope> slopes_;
