@@ -123,8 +123,8 @@ class SpatialRobot:
         check_proportions(self)
         self._check_rod()
         check_disks(self)
-        check_point_count(self, self.lines * self.positions)
         self._check_cable_limit()
+        check_point_count(self, self.lines * self.positions)  # last: the lines are kept for a robot that is valid
 
     def _check_rod(self) -> None:
         assign, paper = object.__setattr__, (Cable(), Cable(angle=self.angle))

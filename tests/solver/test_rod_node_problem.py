@@ -77,11 +77,17 @@ SPATIAL_SHAPES = [
 PULLED = {Robot: (9.0, -12.0, 2.5), spatial.SpatialRobot: (7.5, 0.0, -11.0, 1.0, -4.0, -6.0)}
 
 
+def kernel_of(robot, scene):
+    return (Solver if isinstance(robot, Robot) else spatial.SpatialSolver)(robot, scene)
+
+
+def reference_of(robot, scene):
+    return (ReferenceSolver if isinstance(robot, Robot) else spatial.SpatialReferenceSolver)(robot, scene)
+
+
 def solvers(robot, scene):
-    """Kernel and reference solver of a robot."""
-    if isinstance(robot, Robot):
-        return Solver(robot, scene), ReferenceSolver(robot, scene)
-    return spatial.SpatialSolver(robot, scene), spatial.SpatialReferenceSolver(robot, scene)
+    """Kernel and reference solver of a robot, which takes seconds to build."""
+    return kernel_of(robot, scene), reference_of(robot, scene)
 
 
 def certificate(equilibrium):
@@ -187,7 +193,7 @@ def test_rest_and_free_pull(robot):
 def test_energy_grows_by_the_work_of_the_cables(robot):
     """Its slope in a displacement is the tension, loads and springs included."""
     obstacle = PLANAR_SHAPES[1] if robot is PLANAR else SPATIAL_SHAPES[0]
-    kernel, _ = solvers(robot, Scene([obstacle]))
+    kernel = kernel_of(robot, Scene([obstacle]))
     *_, here = pull(kernel)
     for k, change in enumerate(1e-4 * np.eye(len(robot.cables))):
         ahead, behind = (kernel.step(here, here.cables_mm + by) for by in (change, -change))
@@ -219,8 +225,7 @@ def test_a_robot_that_its_loads_press_against_a_wall_is_at_rest():
 def test_reference_stalls_at_the_limit(robot):
     """All cables stop where the first one reaches it."""
     limited = replace(robot, max_tension=2.0)
-    _, reference = solvers(limited, Scene())
-    (stalled,) = pull(reference, 1)
+    (stalled,) = pull(reference_of(limited, Scene()), 1)
     assert stalled.status is Status.STALLED
     assert stalled.tensions.max() == pytest.approx(2.0, rel=1e-5)
     assert certificate(stalled) <= CERTIFIED
@@ -243,7 +248,7 @@ def test_order_of_the_inequalities(robot):
     problem = (planar_problem if is_plane else spatial_problem)(robot, scene.laws, scene.mounted)
     count, cables = (robot_inequality_count if is_plane else rod_inequality_count)(robot), len(robot.cables)
     values = ca.Function("values", [problem.unknowns, problem.parameters], [problem.inequalities, problem.objective])
-    *_, equilibrium = pull(solvers(robot, scene)[0])
+    *_, equilibrium = pull(kernel_of(robot, scene))
     unknowns, parameters, _, multipliers = equilibrium.node_solution()
     inequalities, objective = (value.full().ravel() for value in values(unknowns, parameters))
     assert count == cables + (2 if is_plane else 1) * robot.segments

@@ -33,7 +33,7 @@ def test_it_regulates_with_realistic_sensing():
     kwargs, ratios = {"sensing": "realistic", "split": "train"}, []
     for env_id in sorted(env_id for env_id in ENV_IDS if "Paper" not in env_id):
         policies = PredictiveController(), ForceController.tuned(env_id)
-        planned, integral = (iqm(scores(policy, env_id, 50, 8, **kwargs)) for policy in policies)
+        planned, integral = (iqm(scores(policy, env_id, 50, 6, **kwargs)) for policy in policies)
         ratios.append(float(planned / integral))
     assert max(ratios) < 1.3, ratios
     assert np.exp(np.mean(np.log(ratios))) < 0.9, ratios

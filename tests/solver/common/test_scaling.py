@@ -1,6 +1,7 @@
 """The scaling law: a robot, its obstacles and commands s times as large do the same, with the same forces."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ OTHERS = [0.01, 0.1, 10.0, 1000.0]
 CLOSE = 1e-6  # of the robot's natural units
 
 
+@lru_cache(maxsize=200)  # every scale is compared with it
 def episode(model, index):
     """A solver at s = 1 and a walk in it."""
     if model in LOADED:

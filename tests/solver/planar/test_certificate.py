@@ -76,7 +76,7 @@ def certify(equilibria):
 
 
 @EVERY_MODEL
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(scene=scenes, changes=st.lists(st.tuples(st.floats(0.1, 0.5), st.floats(-1, 1)), min_size=24, max_size=40))
 def test_reference_solver(model, scene, changes):
     robot = replace(

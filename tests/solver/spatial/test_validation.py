@@ -44,6 +44,7 @@ def pulled(robot):
         ({"touch": "rim"}, r"touch is 'rim'; it must be a tuple of some of .*, as \('backbone',\)"),
         ({"rim_points": 16.0}, "rim_points is 16.0; it must be a whole number from 3 to 64"),
         ({"offset_mm": 1e-3}, "offset_mm is 0.001; it must be from 0.018 to 1800"),
+        ({"max_cable_mm": []}, r"max_cable_mm is \[\]; it must be positive and finite"),
         (
             {"model": "paper", "segments": 4096, "between": 16},
             "348165 points that can touch, and at most 262144 are allowed",
