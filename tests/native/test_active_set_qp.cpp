@@ -248,6 +248,42 @@ void nearly_closed() {
   CHECK(wanted.problem.gaps()[wanted.contact(0)] + wanted.slope(0).along(step) >= -left);
 }
 
+// A closed gap of a point whose wall lies between two others of the same point: the forces of one of these and it
+// balance the same as those of both.
+template <class Model>
+void exchanges() {
+  Random random(6);
+  Wanted<Model> wanted(random, 3);
+  wanted.points = {5, 5, 5};
+  Vec<Model::kSpace>* normals = wanted.normals.data();
+  for (int k = 0; k < Model::kSpace; ++k) normals[2][k] = 0.6 * normals[0][k] + 0.8 * normals[1][k];
+  const double length = norm(normals[2]);
+  for (double& part : normals[2].v) part /= length;
+  for (const double open : {0.0, 1e-9}) {
+    std::fill(wanted.gaps.begin(), wanted.gaps.end(), 0);
+    wanted.gaps[2] = open * wanted.robot.max_length;
+    wanted.build_walls();
+    ActiveSet active = wanted.at.active;
+    for (int j = 0; j < 2; ++j) {
+      active.contact[active.count] = wanted.contact(j);
+      active.multiplier[active.count++] = (1 + j) * kLargest;
+    }
+    const std::vector<double> before = wanted.multipliers(active);
+    ActiveSetQp<Model> qp(wanted.of.segments, 0);
+    REQUIRE(qp.exchange_dependent(wanted.problem, wanted.kkt, active) == (open == 0));
+    const std::vector<double> after = wanted.multipliers(active);
+    CHECK(std::all_of(after.begin(), after.end(), [](double multiplier) { return multiplier >= 0; }));
+    CHECK((after[0] == 0) == (open == 0));  // the first vanishes at 1 / 0.6, the second at 2 / 0.8
+    Direction<Model> pushed(wanted.of.segments, 0);
+    std::vector<double> change = after;
+    for (int j = 0; j < wanted.count(); ++j) change[j] -= before[j];
+    wanted.add_responses(change, pushed);
+    wanted.step.clear();
+    wanted.add_responses(before, wanted.step);
+    CHECK(largest(flat<Model>(pushed.controls, pushed.mounts)) <= 1e-10 * wanted.size());
+  }
+}
+
 #define CCR_MODELS PlanarPaper, PlanarRod, SpatialPaper, SpatialRod
 
 TEST_CASE_TEMPLATE("the active set and multipliers are those that were chosen", Model, CCR_MODELS) {
@@ -259,6 +295,7 @@ TEST_CASE_TEMPLATE("a restoration is the smallest step that closes the gaps", Mo
   restorations<Model>();
 }
 TEST_CASE_TEMPLATE("a restoration closes every gap as far as it has to", Model, CCR_MODELS) { nearly_closed<Model>(); }
+TEST_CASE_TEMPLATE("a dependent gap takes the place of an active one", Model, CCR_MODELS) { exchanges<Model>(); }
 
 }  // namespace
 }  // namespace ccr::testing

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "model/models.hpp"
 
@@ -128,6 +129,33 @@ bool ActiveSetQp<Model>::drop_negative_multipliers(const ContactProblem& problem
   return negative_ == 0;
 }
 
+// Leaves in `trade` the combination of the active gaps that is nearest to the slope of the gap after them; returns the
+// curvature ∇cᵀH⁻¹∇c of the rest.
+template <class Model>
+double ActiveSetQp<Model>::combine(int count, Multipliers& trade) const {
+  const Direction& response = responses_[count];
+  Multipliers coupling;
+  for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(j, response);
+  solve_gram(count, trade);
+  double curvature = along(count, response);
+  for (int j = 0; j < count; ++j) curvature -= coupling[j] * trade[j];
+  return curvature;
+}
+
+// The active gap whose multiplier is the first to vanish as a combination is taken off, or -1; and how much of it is
+// then.
+template <class Model>
+std::pair<int, double> ActiveSetQp<Model>::first_released(const ActiveSet& active, const Multipliers& trade) const {
+  int first = -1;
+  double part = std::numeric_limits<double>::infinity();
+  for (int j = 0; j < active.count; ++j)
+    if (trade[j] > 0 && active.multiplier[j] / trade[j] < part) {
+      part = active.multiplier[j] / trade[j];
+      first = j;
+    }
+  return {first, part};
+}
+
 // Adds a violated gap by dual steps: its multiplier grows until the gap is closed. A step that would make another
 // multiplier negative ends where that is 0, and removes it. False where the gaps have no common solution.
 template <class Model>
@@ -142,22 +170,11 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
     const int count = active.count;
     const Direction& response = responses_[count];
     if (factor_gram(active) != Gram::kSound) return false;
-    Multipliers coupling, trade;
-    for (int j = 0; j < count; ++j) coupling[j] = trade[j] = along(j, response);
-    solve_gram(count, trade);
-    const double full = along(count, response);
-    double curvature = full;
-    for (int j = 0; j < count; ++j) curvature -= coupling[j] * trade[j];
-
-    double to_release = kNever;
-    int blocking = -1;
-    for (int j = 0; j < count; ++j)
-      if (trade[j] > 0 && active.multiplier[j] / trade[j] < to_release) {
-        to_release = active.multiplier[j] / trade[j];
-        blocking = j;
-      }
+    Multipliers trade;
+    const double curvature = combine(count, trade);
+    const auto [blocking, to_release] = first_released(active, trade);
     const double shortfall = -problem.gaps()[contact] - along(count, step);
-    const double to_close = curvature > kDependent * std::abs(full) ? shortfall / curvature : kNever;
+    const double to_close = curvature > kDependent * std::abs(along(count, response)) ? shortfall / curvature : kNever;
     const double length = std::min(to_release, to_close);
     if (!(length < kNever)) {
       conflict_ = active;
@@ -252,31 +269,6 @@ bool ActiveSetQp<Model>::restore(const ContactProblem& problem, KktSystem& kkt, 
 }
 
 template <class Model>
-bool ActiveSetQp<Model>::find_softest(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active,
-                                      Direction& seed, Direction& softest) {
-  negative_ = kkt.negative;
-  for (int j = 0; j < active.count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
-  kkt.solve(problem, std::span(loads_).first(active.count));
-  if (factor_gram(active) != Gram::kSound) return false;
-  const typename ContactProblem::Slope slope{{}, -1, {}, seed.controls.data()};
-  const Load load{&slope, &softest};
-  for (int round = 0; round < kSofteningRounds; ++round) {
-    kkt.solve(problem, {&load, 1});
-    Multipliers change;
-    for (int j = 0; j < active.count; ++j) change[j] = -along(j, softest);
-    solve_gram(active.count, change);
-    for (int j = 0; j < active.count; ++j) softest.add(change[j], responses_[j]);
-    double largest = 0;
-    for (const auto& d : softest.controls)
-      for (const double part : d.v) largest = std::max(largest, std::abs(part));
-    if (!(largest > 0 && std::isfinite(largest))) return false;
-    for (std::size_t i = 0; i < seed.controls.size(); ++i)
-      for (int k = 0; k < Model::kControl; ++k) seed.controls[i][k] = softest.controls[i][k] / largest;
-  }
-  return true;
-}
-
-template <class Model>
 bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
   const Load load{nullptr, &step};
   kkt.solve(problem, {&load, 1});
@@ -285,23 +277,6 @@ bool ActiveSetQp<Model>::correct(const ContactProblem& problem, KktSystem& kkt, 
   apply(closing_multipliers(problem, active, step), active, step);
   const auto end = active.multiplier.begin() + active.count;
   return std::all_of(active.multiplier.begin(), end, [](double multiplier) { return multiplier >= 0; });
-}
-
-template <class Model>
-bool ActiveSetQp<Model>::balance(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step) {
-  int count = 0;
-  negative_ = kkt.negative;
-  for (; count < active.count; ++count) loads_[count] = linearize_gap(problem, active.contact[count], count, 0);
-  loads_[count++] = {nullptr, &step};
-  kkt.solve(problem, std::span(loads_).first(count));
-  Gram gram = factor_gram(active);
-  for (; gram == Gram::kDependent; gram = factor_gram(active)) remove_contact(active, dependent_, active.count);
-  if (gram == Gram::kUnstable) return false;
-  Multipliers change;
-  for (int j = 0; j < active.count; ++j) change[j] = -along(j, step);
-  solve_gram(active.count, change);
-  apply(change, active, step);
-  return true;
 }
 
 #define CCR_INSTANTIATE(Model) template class ActiveSetQp<Model>;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "solve/contact_problem.hpp"
@@ -42,6 +43,11 @@ class ActiveSetQp {
   // contains. False where H is not positive definite on the tangent space. Multipliers may become negative.
   bool balance(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
+  // Lets a closed gap whose slope depends on those of the active ones take the place of one of them, with multipliers
+  // that balance the same: a link that lies flush on a flank may go on along it on other points. False where there is
+  // none.
+  bool exchange_dependent(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active);
+
   // Where the last solve or restoration found that the linearised gaps have no common solution: those gaps, the last
   // one that which could not be added, with multipliers ν >= 0 that balance each other, Σ ν ∇c = 0. Empty otherwise.
   const ActiveSet& conflict() const { return conflict_; }
@@ -67,6 +73,8 @@ class ActiveSetQp {
   Multipliers closing_multipliers(const ContactProblem& problem, const ActiveSet& active, const Direction& step) const;
   void apply(const Multipliers& change, ActiveSet& active, Direction& step) const;
   bool add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active, Direction& step);
+  double combine(int count, Multipliers& trade) const;
+  std::pair<int, double> first_released(const ActiveSet& active, const Multipliers& trade) const;
   int most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step,
                     double tolerance) const;
 

@@ -297,6 +297,11 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest, bool defin
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
   const bool flat = is_flat(at.active);
   if (fruitless_ > kFruitless) return result;
+  if (flat && qp_.exchange_dependent(problem, kkt_, at.active)) {
+    flat_ = 0;
+    problem.reduced_gradient(at.active);
+    if (!factor_convexified(at.active, kDescentPenalties)) return result;
+  }
   if (stationary || (flat && damping_ > 0)) {
     result.moved = leave_saddle(at, largest);
     if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;

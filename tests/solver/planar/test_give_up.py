@@ -69,6 +69,27 @@ SLIPS_OFF_A_SPRING = (
         spring=0.21,
     ),
 )
+LARGE = replace(PAPER, length_mm=1676.343127396044, offset_mm=80.0, disk_radius_mm=80.0, rigidity=5e5, between=3)
+LARGE = replace(LARGE, max_cable_mm=251.327, length_range_mm=(1000.0, 1800.0))
+SLIDES_ALONG_A_FLANK = (
+    Polygon(
+        corners=(
+            (134.70868600615677, 1315.0368484996463),
+            (166.7954796181333, 1235.3807292101446),
+            (246.24631093079446, 1237.6886993249088),
+            (274.9924186778483, 1279.5691057954296),
+            (254.6638859584454, 1349.3555124369368),
+            (171.8264860238685, 1361.3830080272373),
+        ),
+        radius=16.88192974333283,
+        spring=0.000607703944770859,
+    ),
+    Ellipse(
+        center=(486.5765840815759, 1207.91292985501),
+        radii=(19.33282508858494, 40.68970881155426),
+        axis=(-0.9906865387486671, -0.13616233672416753),
+    ),
+)
 
 ROD = Robot.prototype(
     **{"length_mm": 149.0, "length_range_mm": (100.0, 180.0), "max_cable_mm": 25.0},
@@ -100,6 +121,7 @@ FED_INTO_A_CHANNEL = (
             PULLED_OVER_A_CORNER,
             ((11.760266471349633, None), (12.321153669669558, None), (12.487393185968, None)),
         ),
+        (LARGE, SLIDES_ALONG_A_FLANK, ((50.365, 1606.145), (156.166, 1588.997), (58.124, 1576.662))),
         (ROD, FED_INTO_A_CHANNEL, ((4.2, 100.0), (0.8, 158.6))),
         (LONG, SLIPS_OFF_A_SPRING, ((16.684440648566614, 174.86340406235342), (6.810434947841618, 176.34558792448638))),
     ],
@@ -107,6 +129,7 @@ FED_INTO_A_CHANNEL = (
         "no penalty shows that it is stable",
         "pegs hold it far from its free shape",
         "a step beyond a corner",
+        "a link lies flush on a flank",
         "a step along which the energy rises",
         "its segments shear one after another",
     ],
