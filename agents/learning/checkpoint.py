@@ -1,8 +1,8 @@
 """Checkpoints: everything that resumes a training run, in one file of tensors and JSON.
 
 That is the weights, the moments of the optimisers, the normalisation of observations and rewards, the replay buffer or
-the imitated actions, the counters and the learning curve. A resumed run plays new episodes: their seeds, and that of
-exploration, follow from the seed of the run and the number of steps done.
+the imitated actions, the counters and the learning curve. A resumed run plays new episodes, up to the step in which it
+was left: their seeds, and that of exploration, follow from the seed of the run and the number of steps done.
 """
 
 import time

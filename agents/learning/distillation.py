@@ -27,7 +27,7 @@ from agents.learning.checkpoint import (
     statistics_tensors,
 )
 from agents.learning.checks import Form, check_tensors, moment_forms
-from agents.learning.learners import make_envs
+from agents.learning.learners import make_envs, play_on
 from agents.learning.log import recording
 from agents.learning.network import EPSILON, Network, normalized, standard_deviation
 from agents.policy import motor_actions, natural, search
@@ -195,7 +195,8 @@ def distill(run: TrainingRun, settings: DistilledSettings, progress: bool) -> tu
     if run.state:
         with run.rejecting_damage():
             imitation.restore(run.progress.steps, run.state)
-    rows, generator = envs.reset(), np.random.default_rng(run.seed)
+    rows, _ = play_on(imitation.student, envs, run.progress.steps // settings.envs)
+    generator = np.random.default_rng(run.seed)
     assert isinstance(rows, np.ndarray)
     rollouts, first = Rollouts(envs, rows, generator), run.progress.steps // imitation.count
     with recording(run.config.run) as log:

@@ -1,10 +1,13 @@
 """Untrained learners: PPO and SAC of Stable-Baselines3, recurrent PPO of sb3-contrib, and their environments."""
 
+import numpy as np
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.type_aliases import PolicyPredictor
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs
 
 from agents.config import TrainConfig
 from agents.learning.memory import MemoryVecEnv
@@ -34,6 +37,27 @@ def normalized_envs(envs: VecEnv, config: TrainConfig) -> VecNormalize:
     off_policy = isinstance(config.learner, SACSettings)
     gamma = getattr(config.learner, "gamma", 1.0)
     return VecNormalize(envs, gamma=gamma, clip_obs=CLIP, norm_reward=not off_policy, epsilon=EPSILON)
+
+
+def play_on(policy: PolicyPredictor, envs: VecEnv, done: int) -> tuple[VecEnvObs, np.ndarray]:
+    """Play new episodes up to the step in which a run was left, as they all began together and are equally long.
+
+    Without this, a run that is often resumed would see little but how episodes begin.
+
+    Args:
+        policy: The policy.
+        envs: Environments.
+        done: Steps of each environment that the run has done.
+
+    Returns:
+        The rows of the next step, and which episodes it begins, ``(N,)`` bool.
+    """
+    rows, starts = envs.reset(), np.ones(envs.num_envs, bool)
+    state: tuple[np.ndarray, ...] | None = None
+    for _ in range(done % envs.get_attr("max_episode_steps", [0])[0]):
+        actions, state = policy.predict(rows, state, starts)  # type: ignore[arg-type] # rows are arrays
+        rows, _, starts, _ = envs.step(actions)
+    return rows, starts
 
 
 def make_learner(envs: VecNormalize, config: TrainConfig) -> BaseAlgorithm:

@@ -4,9 +4,11 @@ import contextlib
 from pathlib import Path
 
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig, check_parallel
 from agents.errors import UserError
@@ -14,7 +16,7 @@ from agents.files import LOCK, PARTIAL, locked
 from agents.learning.actor import ACTOR, LearningCurve, TrainingRecord, export
 from agents.learning.checkpoint import CHECKPOINT, TrainingRun, learner_state, restore_learner
 from agents.learning.distillation import distill
-from agents.learning.learners import make_envs, make_learner, normalized_envs
+from agents.learning.learners import make_envs, make_learner, normalized_envs, play_on
 from agents.learning.log import LOG, own_files, recording
 from agents.learning.network import Network
 from agents.tuned import DistilledSettings
@@ -162,6 +164,7 @@ def _learn(run: TrainingRun, progress: bool) -> tuple[Network, RunningMeanStd]:
         with run.rejecting_damage():
             restore_learner(model, run.progress.steps, run.state)
         model.set_random_seed(run.seed)  # the learner was made with the seed of the configuration
+        _play_on(model, envs)
     with recording(config.run) as log:
         model.set_logger(configure(str(log), ["tensorboard"]))
     remaining = config.learner.steps - model.num_timesteps
@@ -169,3 +172,11 @@ def _learn(run: TrainingRun, progress: bool) -> tuple[Network, RunningMeanStd]:
     assert isinstance(envs.obs_rms, RunningMeanStd)
     envs.close()
     return Network.of(model.policy, config.learner), envs.obs_rms
+
+
+def _play_on(model: BaseAlgorithm, envs: VecNormalize) -> None:
+    """Let a restored learner go on amid the episodes, by what it knows."""
+    envs.training = False
+    model._last_obs, model._last_episode_starts = play_on(model, envs, model.num_timesteps // envs.num_envs)  # type: ignore[assignment]
+    model._last_original_obs = envs.get_original_obs()
+    envs.training = True

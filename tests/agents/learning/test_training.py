@@ -18,7 +18,7 @@ from agents.files import locked
 from agents.learning import checkpoint, distillation, log, training
 from agents.learning.actor import ACTOR, LearnedPolicy, export
 from agents.learning.checkpoint import learner_state
-from agents.learning.learners import ALGORITHMS, make_envs, make_learner, normalized_envs
+from agents.learning.learners import ALGORITHMS, make_envs, make_learner, normalized_envs, play_on
 from agents.learning.network import CLIP, EPSILON, Network
 from agents.learning.pretrained import trained
 from agents.learning.tensors import read_tensors, write_tensors
@@ -146,6 +146,24 @@ def test_a_learner_is_restored_bit_for_bit(name, tmp_path, monkeypatch, killed):
     assert fresh.num_timesteps == run.progress.steps
 
 
+def test_a_resumed_run_goes_on_amid_the_episodes():
+    class Still:
+        def predict(self, rows, state, starts):
+            seen.append(starts.copy())
+            return np.zeros((4, 1), np.float32), state
+
+    config, seen = TrainConfig(run=Path(), learner=SMALL["PPO"]), []
+    envs = make_envs(config, 4, 7)
+    length = envs.get_attr("max_episode_steps")[0]
+    rows, starts = play_on(Still(), envs, 2 * length + 30)
+    assert rows.shape == (4, *envs.observation_space.shape)
+    assert [start.all() for start in seen] == [True] + 29 * [False]
+    assert not starts.any()
+    ends = [envs.step(np.zeros((4, 1), np.float32))[2] for _ in range(length - 30)]
+    assert not np.any(ends[:-1])
+    assert ends[-1].all()
+
+
 ROLLOUTS = {"PPO": 24, "Distilled": 8}  # a checkpoint after each
 LEARNING = {
     "PPO": PPOSettings(steps=ROLLOUTS["PPO"] * 1024, envs=16, rollout=64, batch_size=128, epochs=6, width=32),
@@ -168,7 +186,7 @@ def test_a_run_killed_after_every_checkpoint_learns_as_one_left_alone(name, tmp_
     killed = until_finished(TrainConfig(run=tmp_path / "killed", **kwargs)).training.curve.returns
     assert kills[0] >= ROLLOUTS[name] - 1
     assert len(killed) == len(alone)
-    assert killed[-1] > alone[-1] - 15
+    assert killed[-1] > alone[-1] - 5
     if name != "Distilled":  # it has learned nearly all in its first round
         assert min(alone[-1], killed[-1]) > max(alone[0], killed[0]) + 15
 
