@@ -37,30 +37,34 @@ bool ActiveSetQp<Model>::find_softest(const ContactProblem& problem, KktSystem& 
 }
 
 template <class Model>
-bool ActiveSetQp<Model>::exchange_dependent(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active) {
+int ActiveSetQp<Model>::exchange_dependent(const ContactProblem& problem, KktSystem& kkt, int after,
+                                           ActiveSet& active) {
   const int count = active.count;
-  if (count == kMaxActive) return false;
+  if (count == kMaxActive) return -1;
   negative_ = kkt.negative;
   for (int j = 0; j < count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
   kkt.solve(problem, std::span(loads_).first(count));
-  if (factor_gram(active) != Gram::kSound) return false;
+  if (factor_gram(active) != Gram::kSound) return -1;
   const auto end = active.contact.begin() + count;
-  for (const int contact : problem.near_contacts()) {
-    if (problem.gaps()[contact] > kFeasibility * problem.robot().max_length) continue;
-    if (std::find(active.contact.begin(), end, contact) != end) continue;
-    const Load newcomer = linearize_gap(problem, contact, count, 0);
-    kkt.solve(problem, {&newcomer, 1});
-    Multipliers trade;
-    const double curvature = combine(count, trade);
-    if (curvature > kNearlyDependent * std::abs(along(count, responses_[count]))) continue;
-    const auto [leaving, multiplier] = first_released(active, trade);
-    if (leaving < 0) continue;
-    for (int j = 0; j < count; ++j) active.multiplier[j] = std::max(0.0, active.multiplier[j] - multiplier * trade[j]);
-    active.contact[leaving] = contact;
-    active.multiplier[leaving] = multiplier;
-    return true;
-  }
-  return false;
+  for (const bool comes_after : {true, false})
+    for (const int contact : problem.near_contacts()) {
+      if ((contact > after) != comes_after) continue;
+      if (problem.gaps()[contact] > kFeasibility * problem.robot().max_length) continue;
+      if (std::find(active.contact.begin(), end, contact) != end) continue;
+      const Load newcomer = linearize_gap(problem, contact, count, 0);
+      kkt.solve(problem, {&newcomer, 1});
+      Multipliers trade;
+      const double curvature = combine(count, trade);
+      if (curvature > kNearlyDependent * std::abs(along(count, responses_[count]))) continue;
+      const auto [leaving, multiplier] = first_released(active, trade);
+      if (leaving < 0) continue;
+      for (int j = 0; j < count; ++j)
+        active.multiplier[j] = std::max(0.0, active.multiplier[j] - multiplier * trade[j]);
+      active.contact[leaving] = contact;
+      active.multiplier[leaving] = multiplier;
+      return contact;
+    }
+  return -1;
 }
 
 template <class Model>
@@ -83,7 +87,7 @@ bool ActiveSetQp<Model>::balance(const ContactProblem& problem, KktSystem& kkt, 
 #define CCR_INSTANTIATE(Model)                                                                                    \
   template bool ActiveSetQp<Model>::find_softest(const ContactProblem&, KktSystem&, const ActiveSet&, Direction&, \
                                                  Direction&);                                                     \
-  template bool ActiveSetQp<Model>::exchange_dependent(const ContactProblem&, KktSystem&, ActiveSet&);            \
+  template int ActiveSetQp<Model>::exchange_dependent(const ContactProblem&, KktSystem&, int, ActiveSet&);        \
   template bool ActiveSetQp<Model>::balance(const ContactProblem&, KktSystem&, ActiveSet&, Direction&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

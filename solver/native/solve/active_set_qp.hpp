@@ -44,9 +44,9 @@ class ActiveSetQp {
   bool balance(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
   // Lets a closed gap whose slope depends on those of the active ones take the place of one of them, with multipliers
-  // that balance the same: a link that lies flush on a flank may go on along it on other points. False where there is
-  // none.
-  bool exchange_dependent(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active);
+  // that balance the same: a link that lies flush on a flank may go on along it on other points. Returns that gap, the
+  // next one after a given one, from the first again after the last; -1 where there is none.
+  int exchange_dependent(const ContactProblem& problem, KktSystem& kkt, int after, ActiveSet& active);
 
   // Where the last solve or restoration found that the linearised gaps have no common solution: those gaps, the last
   // one that which could not be added, with multipliers ν >= 0 that balance each other, Σ ν ∇c = 0. Empty otherwise.

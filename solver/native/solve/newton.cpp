@@ -247,6 +247,7 @@ bool Newton<Model>::set_metric(const Iterate& at) {
   creeping_ = false;
   lowest_ = HUGE_VAL;
   flat_ = fruitless_ = dropped_ = 0;
+  exchanged_ = -1;
   if (!problem.evaluate(at)) return false;
   problem.reduced_gradient(at.active);
   return factor_convexified(at.active, kDescentPenalties) && factor_metric();
@@ -297,8 +298,7 @@ NewtonResult Newton<Model>::descend_once(Iterate& at, double largest, bool defin
   if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
   const bool flat = is_flat(at.active);
   if (fruitless_ > kFruitless) return result;
-  if (flat && qp_.exchange_dependent(problem, kkt_, at.active)) {
-    flat_ = 0;
+  if (flat && exchange_dependent(at.active)) {
     problem.reduced_gradient(at.active);
     if (!factor_convexified(at.active, kDescentPenalties)) return result;
   }

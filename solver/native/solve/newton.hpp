@@ -76,6 +76,7 @@ class Newton {
   bool gaps_closed(const ActiveSet& active, double tolerance) const;
   void choose_test();
   bool release_lowest(const Iterate& at, ActiveSet& target);
+  bool exchange_dependent(ActiveSet& active);
   bool slide_along(const ActiveSet& active, ActiveSet& target);
   bool factor_penalized(const ActiveSet& active, int penalties);
   bool factor_stable(const ActiveSet& active, int penalties);
@@ -105,6 +106,7 @@ class Newton {
   double lowest_ = 0;          // energy of this descent when it fell last
   int fruitless_ = 0;          // iterates since then,
   int flat_ = 0;               // and since a saddle was suspected
+  int exchanged_ = -1;         // the last gap that took the place of one that it depends on
   int dropped_ = 0;            // iterates that would not be stable without a gap that they drop
 };
 

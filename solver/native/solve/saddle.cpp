@@ -103,6 +103,16 @@ bool Newton<Model>::release_lowest(const Iterate& at, ActiveSet& target) {
   return solved && slide_along(at.active, target);
 }
 
+// Lets the next closed gap take the place of an active one that it depends on; false where there is none.
+template <class Model>
+bool Newton<Model>::exchange_dependent(ActiveSet& active) {
+  const int contact = qp_.exchange_dependent(problem, kkt_, exchanged_, active);
+  if (contact < 0) return false;
+  exchanged_ = contact;
+  flat_ = 0;
+  return true;
+}
+
 // Solves for the step that keeps active gaps as they are, and drops those that would pull the robot at its end.
 template <class Model>
 bool Newton<Model>::slide_along(const ActiveSet& active, ActiveSet& target) {
@@ -122,6 +132,7 @@ bool Newton<Model>::slide_along(const ActiveSet& active, ActiveSet& target) {
   template bool Newton<Model>::bend_softly(Iterate&, const ActiveSet&, double); \
   template bool Newton<Model>::leave_saddle(Iterate&, double);                  \
   template bool Newton<Model>::release_lowest(const Iterate&, ActiveSet&);      \
+  template bool Newton<Model>::exchange_dependent(ActiveSet&);                  \
   template bool Newton<Model>::slide_along(const ActiveSet&, ActiveSet&);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
