@@ -96,10 +96,13 @@ def train(config: TrainConfig) -> None:
 def evaluate(config: EvaluateConfig) -> None:
     """Evaluate policies on test scenes."""
     from agents.benchmark import report, suite
+    from agents.files import check_writable
     from agents.progress import followed
 
     entries = suite.entries(config)
-    (config.out / "videos" if config.video else config.out).mkdir(parents=True, exist_ok=True)
+    check_writable(*(config.out / name for name in ("evaluation.json", "scores.json", "evaluation.md")))
+    if config.video:
+        (config.out / "videos").mkdir(exist_ok=True)
     results = list(followed(suite.play_all(config, entries), "evaluate", len(entries)))
     if config.video:
         list(followed(suite.film_all(config, results), "film", len(results)))

@@ -1,6 +1,7 @@
 """Files that are either written completely or not at all, and locks on folders."""
 
 import contextlib
+import errno
 import fcntl
 import os
 from collections.abc import Iterator
@@ -33,6 +34,25 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):  # it is not there, also on a disk that cannot be written
             partial.unlink()
+
+
+def check_writable(*paths: Path) -> None:
+    """Refuse files that cannot be written, before the work whose results they are to take; make their folders.
+
+    Raises:
+        UserError: If one of them cannot be written.
+        OSError: If a folder cannot be made.
+    """
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(PARTIAL + path.name)
+        try:
+            if path.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            partial.touch()
+            partial.unlink()
+        except OSError as error:
+            raise UserError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def write_text(path: Path, text: str) -> None:

@@ -196,7 +196,7 @@ def check_ranges(name: str, value: object, *, bounds: Sequence[Mapping[str, floa
     if len(ranges) != len(bounds):
         raise refusal(name, value, wanted)
     return tuple(
-        check_range(f"{name}[{k}]", ends, low=own.get("low", -LARGEST))
+        check_range(f"{name}[{k}]", ends, low=own.get("low", -LARGEST), high=own.get("high", LARGEST))
         for k, (ends, own) in enumerate(zip(ranges, bounds, strict=True))
     )
 

@@ -25,7 +25,9 @@ CYLINDER_EDGE = 1 / 90  # rounding of its edges [L]
 TURN = (0.0, 2 * math.pi)  # range of an angle
 BREATHS = 64  # as many as an episode can have, and more
 LEVELS = (0.3, 1.0)  # range of the levels of a moving set-point, before they are scaled to a maximum of 1
-CIRCLE: tuple[dict[str, float], ...] = ({}, {}, {"low": SMALLEST})  # bounds of x, y and radius
+FARTHEST = 10.0  # coordinate of an obstacle, far beyond what a robot reaches [L]
+PLACE = {"low": -FARTHEST, "high": FARTHEST}
+CIRCLE: tuple[dict[str, float], ...] = (PLACE, PLACE, {"low": SMALLEST})  # bounds of x, y and radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +40,8 @@ class LoadCell(Task[Robot]):
         force: Range of the set-point, that of the paper's Table 1 [EI/L²].
     """
 
-    distance: Range = checked((24 / PAPER_MM, 51 / PAPER_MM), check_range, low=SMALLEST)
-    height: float = checked(127 / PAPER_MM, check_number)
+    distance: Range = checked((24 / PAPER_MM, 51 / PAPER_MM), check_range, low=SMALLEST, high=FARTHEST)
+    height: float = checked(127 / PAPER_MM, check_number, **PLACE)
     force: Range = checked((0.2, 1.5), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
@@ -62,8 +64,8 @@ class PushObstacle(Task[Robot]):
         force: Range of the set-point [EI/L²].
     """
 
-    x: Range = checked((0.2, 0.42), check_range)
-    y: Range = checked((0.42, 0.83), check_range)
+    x: Range = checked((0.2, 0.42), check_range, **PLACE)
+    y: Range = checked((0.42, 0.83), check_range, **PLACE)
     radius: Range = checked((0.056, 0.09), check_range, low=SMALLEST)
     force: Range = checked((0.4, 2.9), check_force_range)
 
@@ -203,7 +205,7 @@ class InsertAndPush(PushObstacle):
 
     adapter: ClassVar[type[AnyAdapter]] = InsertionAdapter
 
-    y: Range = checked((0.47, 0.8), check_range)
+    y: Range = checked((0.47, 0.8), check_range, **PLACE)
     radius: Range = checked((0.064, 0.1), check_range, low=SMALLEST)
     force: Range = checked((0.2, 1.5), check_force_range)  # as BracedPush
 
@@ -225,8 +227,8 @@ class SpatialPush(Task[SpatialRobot]):
 
     adapter: ClassVar[type[AnyAdapter]] = SpatialAdapter
 
-    distance: Range = checked((0.2, 0.36), check_range, low=0)
-    height: Range = checked((0.45, 0.83), check_range)
+    distance: Range = checked((0.2, 0.36), check_range, low=0, high=FARTHEST)
+    height: Range = checked((0.45, 0.83), check_range, **PLACE)
     radius: Range = checked((0.056, 0.09), check_range, low=SMALLEST)
     cylinder_fraction: float = checked(0.5, check_number, low=0, high=1)
     max_tilt: float = checked(math.pi / 6, check_number, low=0, high=math.pi / 2)

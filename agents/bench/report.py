@@ -7,13 +7,13 @@ from rich.table import Table
 
 from agents.bench import kernel, peers, space, throughput
 from agents.config import BenchConfig
-from agents.files import JsonObject, write_text
+from agents.files import JsonObject, check_writable, write_text
 
 
 def bench(config: BenchConfig) -> JsonObject:
     """Measure, print the tables and, if a file is given, write the results."""
     if config.json is not None:
-        config.json.parent.mkdir(parents=True, exist_ok=True)
+        check_writable(config.json)
     found = {
         "kernel": kernel.measure(config.steps, config.rivals),
         "kernel_in_space": space.measure(config.steps),

@@ -9,7 +9,9 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 import ccr_gym  # noqa: F401 - registers the ids
+from agents.arguments import check_whole
 
+LARGEST_SEED = 2**63 - 1
 InfoArrays = Mapping[str, "np.ndarray | InfoArrays"]
 
 
@@ -33,6 +35,14 @@ class SB3VecEnv(VecEnv):
         super().__init__(n_envs, self._env.single_observation_space, self._env.single_action_space)
         if seed is not None:
             self.seed(seed)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed the next reset: the first environment by this seed, the others by the following ones.
+
+        Raises:
+            ValueError: If it is neither None nor a whole number from 0 on.
+        """
+        return super().seed(None if seed is None else check_whole("seed", seed, 0, LARGEST_SEED))
 
     def reset(self) -> VecEnvObs:
         """Start episodes in all environments."""

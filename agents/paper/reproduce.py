@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from agents.arguments import check_kind
-from agents.files import write_text
+from agents.files import check_writable, write_text
 from agents.paper.claims import claims
 from agents.paper.comparison import scores
 from agents.paper.figures import draw_comparison, draw_figures
@@ -24,7 +24,7 @@ def reproduce(folder: Path) -> list[Claim]:
         TypeError: If ``folder`` is no path.
     """
     check_kind("folder", folder, Path, "give a pathlib.Path")
-    folder.mkdir(parents=True, exist_ok=True)
+    check_writable(*(folder / name for name in ("paper.json", "paper.md", "two_models.md")))
     found, scored = claims(), scores()
     draw_comparison(folder / "table_1.png")
     draw_figures(folder / "paper.png")

@@ -79,12 +79,17 @@ def assert_one_line(code, lines, *words):
         (("sweep", "--out", "file"), "file"),
         (("reproduce", "--out", "file"), "file"),
         (("bench", "--json", "file/bench.json"), "file"),
+        (("bench", "--json", "taken"), "taken cannot be written: Is a directory"),
+        (("reproduce", "--out", "out"), "out/paper.json cannot be written: Is a directory"),
+        (("evaluate", "--out", "out", "--policies", "PI"), "out/evaluation.json cannot be written: Is a directory"),
         (("retrain", "--out", "file", "--jobs", "1", "--seeds", "1"), "file"),
     ],
 )
 def test_what_cannot_be_used_is_named(arguments, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("in the way")
+    for folder in ("taken", "out/paper.json", "out/evaluation.json"):
+        Path(folder).mkdir(parents=True)
     assert_one_line(*called(monkeypatch, capsys, *arguments), words)
     assert Path("file").read_text() == "in the way"
 

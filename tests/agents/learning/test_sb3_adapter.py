@@ -55,3 +55,13 @@ def test_attributes_are_those_of_all():
     with pytest.raises(AttributeError, match="force_limit cannot be set"):
         environments.set_attr("force_limit", 1.0)
     environments.close()
+
+
+@pytest.mark.parametrize("seed", [1.5, -1, True, "7", 2**63])
+def test_a_seed_that_is_none_is_refused_at_once(seed):
+    environments = SB3VecEnv(ENV_ID, COUNT, seed=3)
+    with pytest.raises(ValueError, match=r"seed is .*; it must be a whole number from 0"):
+        environments.seed(seed)
+    with pytest.raises(ValueError, match="seed is"):
+        SB3VecEnv(ENV_ID, COUNT, seed=seed)
+    assert np.array_equal(environments.reset(), SB3VecEnv(ENV_ID, COUNT, seed=3).reset())
