@@ -17,7 +17,7 @@ from solver.common.batch import BaseBatch
 from solver.common.geometry import subdivide
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
-from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialSolver
+from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialSolver, sides
 
 SettingsT = TypeVar("SettingsT", bound=AnySettings)
 PlanarSettingsT = TypeVar("PlanarSettingsT", bound=Settings)
@@ -153,6 +153,10 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         """
         return self.bounded(self.actuation.reached(commanded_mm, self.layout.cables(blocks)))
 
+    def signed(self, blocks: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+        """Return tensions ``(..., cables)`` with the signs of displacements that stand for a pair of opposite cables."""
+        return tensions
+
     def info(self, blocks: np.ndarray, index: int | slice) -> dict[str, Quantity]:
         """Return displacements and tensions of the cables, of a single one as numbers."""
         cables, tensions = self.layout.cables(blocks), self.layout.tensions(blocks)
@@ -257,6 +261,12 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
         nodes, frames = self.layout.nodes(blocks)[..., None, :, :], self.layout.frames(blocks)[..., None, :, :, :]
         lines = nodes + lines_mm[..., :1] * frames[..., 0] + lines_mm[..., 1:] * frames[..., 1]
         return subdivide(lines, self.settings.robot.between)
+
+    def signed(self, blocks: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+        """Return tensions of the paper's model with the signs of its displacements; see the base class."""
+        if self.settings.robot.model == "rod":
+            return tensions
+        return np.asarray(sides(self.layout.cables(blocks)) * tensions)
 
     def pose_features(self) -> Features:
         """Return the position of every node, and the first and last axis of its disk."""

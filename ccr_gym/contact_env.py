@@ -161,6 +161,8 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             self._episodes.set_rows([0], state.episodes)
         self._started = state.episodes is not None
         self._np_random = restored(self._np_random, state.generators[0])
+        if self._pictures is not None and self._started:
+            self._pictures.start([0])
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "_pictures": None}  # a window or canvas is made anew

@@ -20,8 +20,8 @@ from ccr_gym.state import Arrays, put, take
 from solver import RigidityFit, Robot, Scene, fitted_slopes, virtual_work
 from solver.common.operations import ARRAYS, dot
 from solver.common.rows import Rows
-from solver.spatial import sides, with_friction
 from solver.spatial import virtual_work as spatial_virtual_work
+from solver.spatial import with_friction
 
 DIFFERENCE = 1e-4  # of a command, for slopes [a]
 LEAST_SLOPE = 0.02  # of a contact's motion against its force; below, a pull hardly presses on it [L/a]
@@ -38,7 +38,7 @@ class Measured(NamedTuple):
         blocks: Equilibria of the nominal robot, ``(k, size)``.
         actuated_mm: Actuated coordinates that the encoders read, ``(k, actions)`` [mm].
         tensions: Tensions of the cables that the motors see, ``(k, cables)`` [N].
-        onsets: Those at the onset of the present contact, ``(k, cables)`` [N].
+        onsets: Those at the onset of the present contact, signed as displacements of pairs, ``(k, cables)`` [N].
     """
 
     blocks: np.ndarray
@@ -51,7 +51,7 @@ class FreeMotion(NamedTuple):
     """Free robots, and how they move with the commands.
 
     Attributes:
-        tensions: Their tensions, ``(k, cables)`` [N].
+        tensions: Their tensions, signed as displacements of pairs, ``(k, cables)`` [N].
         points: Slopes of the points that can touch, ``(k, commands, lines, positions, d)`` [mm per mm].
         tips: Slopes of the tips, ``(k, commands, d)`` [mm per mm].
     """
@@ -157,7 +157,7 @@ class FreeRobots:
         layout, points = self._adapter.layout, self._adapter.points(blocks, lines_mm)
         tips = layout.nodes(blocks)[..., -1, : points.shape[-1]]
         slopes = (self._slopes(ends[:, 1:] - ends[:, :1], steps) for ends in (points, tips))
-        return FreeMotion(layout.tensions(blocks[:, 0]), *slopes)
+        return FreeMotion(self._adapter.signed(blocks[:, 0], layout.tensions(blocks[:, 0])), *slopes)
 
     def _slopes(self, moved: np.ndarray, steps: np.ndarray) -> np.ndarray:
         """Return slopes along each command from how far the companions have moved."""
@@ -231,7 +231,7 @@ class ForceEstimator:
         if not wanted.any():
             return
         indices, touching = indices[wanted], touching[wanted]
-        measured = Measured(*(entry[wanted] for entry in measured))
+        measured = self._signed(Measured(*(entry[wanted] for entry in measured)))
         motion = None if self._free is None else self._free.move(indices, measured.actuated_mm)
         pressing = None if motion is None else self._pressing(measured, motion)
         if self.learns and motion is not None and pressing is not None:
@@ -243,9 +243,13 @@ class ForceEstimator:
 
     def probe(self, measured: Measured) -> np.ndarray:
         """Return the factors of the estimate that is observed for all robots elsewhere, ``(N,)``; nothing moves."""
+        measured = self._signed(measured)
         motion = None if self._free is None else self._free.probe(measured.actuated_mm)
         pressing = None if motion is None else self._pressing(measured, motion)
         return self._chosen_factors(np.arange(len(self.chosen)), measured, motion, pressing)
+
+    def _signed(self, measured: Measured) -> Measured:
+        return measured._replace(tensions=self._adapter.signed(measured.blocks, measured.tensions))
 
     def _chosen_factors(
         self, robots: np.ndarray, measured: Measured, motion: FreeMotion | None, pressing: Pressing | None
@@ -294,7 +298,6 @@ class ForceEstimator:
             return np.asarray(virtual_work(x, y, loads[:, 0], slopes, offset, ARRAYS))
         if self._tip_known:
             slopes = adapter.layout.tip_slopes(blocks) * np.array([1.0, 1.0, 1.0, *2 * [adapter.scales.travel_mm]])
-            loads = sides(adapter.layout.cables(blocks)) * measured.tensions - measured.onsets
             return spatial_virtual_work(with_friction(total, slopes[..., :3], friction), loads, slopes)
         assert motion is not None
         works = -np.stack([dot(total, motion.tips[:, k]) for k in range(motion.tips.shape[1])], axis=-1)

@@ -39,6 +39,9 @@ class Trials:
     def __init__(self, task: AnyTask, settings: AnySettings, batch: BaseBatch, adapter: AnyAdapter) -> None:
         self._task, self._batch, self._adapter = task, batch, adapter
         self._split, self._limit_mm = settings.split, _limit_mm(settings, adapter)
+        self._remedy = "widen the task's ranges, or either limit"
+        if settings.randomize is not None:
+            self._remedy += ", or narrow the ranges of randomize: not every robot that they allow can do it"
         self._shown_n = settings.force_span * adapter.scales.force_n  # which is made anew at each access
         self._estimator = None
         if settings.regulate == "estimate":
@@ -92,7 +95,7 @@ class Trials:
                 return desired, [assignments[k] for k in range(len(robots))]
         raise RuntimeError(
             f"none of {MAX_SAMPLES} samples of {self._task} can be pushed as desired within {self._limit_mm:.6g} mm of "
-            "cable and the tension limit; widen the task's ranges, or either limit"
+            f"cable and the tension limit; {self._remedy}"
         )
 
     def _pull(

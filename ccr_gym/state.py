@@ -108,10 +108,11 @@ def state_of(generator: np.random.Generator | None) -> Mapping[str, Any] | None:
 
 
 def restored(generator: np.random.Generator | None, state: Mapping[str, Any] | None) -> np.random.Generator | None:
-    """Return a generator in a state, the given one if there is one; None for none."""
+    """Return a generator in a state, the given one if it is of the same kind; None for none."""
     if state is None:
         return None
-    if generator is None:
-        generator = np.random.Generator(np.random.PCG64(0))
+    kind = state["bit_generator"]
+    if generator is None or type(generator.bit_generator).__name__ != kind:
+        generator = np.random.Generator(getattr(np.random, kind)(0))
     generator.bit_generator.state = state
     return generator

@@ -247,7 +247,8 @@ class Transition:
         blocks = batch.blocks[index]
         self._actuated_mm[index] = adapter.actuated_mm(blocks, commanded)
         if sensors is not None:
-            sensors.move_cables(before, self._layout.cables(blocks), index)
+            sides = adapter.signed(blocks, np.ones(before.shape))  # of a pair the other cable moves the other way
+            sensors.move_cables(sides * before, sides * self._layout.cables(blocks), index)
             adapter.write_command(self.model.commands, sensors.motor_mm(index), index)
             self.model.move(index)
         self._sense(index)
@@ -261,7 +262,7 @@ class Transition:
             return
         self._tensions[index] = tensions = self._sensors.measured_tensions(tensions, self._time, index)
         touching = np.asarray(self._layout.flags(blocks).any(axis=-1))[..., None]
-        self._onsets[index] = np.where(touching, self._onsets[index], tensions)
+        self._onsets[index] = np.where(touching, self._onsets[index], self.adapter.signed(blocks, tensions))
 
     def _scenes_ahead(self, index: EnvIndex) -> list[Scene] | None:
         """Return where the obstacles of robots are to be after the step, None where they stay."""

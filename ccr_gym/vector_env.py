@@ -139,12 +139,13 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         rewards[resetting] = 0.0
         observation = self._episodes.shaped(self._episodes.observe(reading), reading)
         infos = self._episodes.infos(reading, terms)
-        self._ended = truncated.copy()
+        self._ended, started = truncated.copy(), resetting
         if self.autoreset_mode is AutoresetMode.SAME_STEP and truncated.any():
             observation, infos = self._restart(truncated, observation, infos, terms)
+            started = truncated
         else:
             infos = masked(infos, everything)
-        self._film(np.flatnonzero(resetting).tolist(), rewards)
+        self._film(np.flatnonzero(started).tolist(), rewards)
         return observation, rewards, np.zeros(self.num_envs, bool), truncated, infos
 
     def get_state(self) -> EnvState:
@@ -166,6 +167,8 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         self._started = state.episodes is not None
         self._generators = [restored(*pair) for pair in zip(self._generators, state.generators, strict=True)]
         self._steps, self._ended = state.steps.copy(), state.ended.copy()
+        if self._pictures is not None and self._started:
+            self._pictures.start(list(range(self.num_envs)))
 
     def fork(self, indices: Sequence[int]) -> None:
         """Let every environment go on as a copy of one of them, the generator included.

@@ -78,6 +78,7 @@ class RobotEstimator:
         check_kind("settings", settings, (Settings, SpatialSettings), "take those of an environment")
         check_whole("count", count, 1, 2**31 - 1)
         self._settings, self._actuation = settings, settings.actuation
+        self._pairs = settings.robot.model == "paper" and isinstance(settings, SpatialSettings)
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
         self._tension_span = settings.tension_span
         sensing = settings.sensors or EXACT
@@ -169,6 +170,8 @@ class RobotEstimator:
             zero = np.zeros(observation["cable"].shape)
             return zero, zero, zero
         measured, free = (self._tension_span * observation[key].astype(float) for key in ("tension", "free_tension"))
+        if self._pairs:  # one displacement and tension of a pair; the sign says which cable is pulled
+            measured = np.where(observation["cable"] < 0, -measured, measured)
         return self._actuation.forces(measured), free, observation["lever"].astype(float)
 
     def _carried(self, free: np.ndarray, motors: np.ndarray, places: np.ndarray, index: EnvIndex) -> np.ndarray:

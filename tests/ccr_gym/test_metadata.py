@@ -1,4 +1,8 @@
-"""What environments say of time: a step stands for ``dt``, and pictures run at its pace."""
+"""What environments say of time and of what their pictures need."""
+
+import re
+import tomllib
+from pathlib import Path
 
 import gymnasium
 import pytest
@@ -12,3 +16,9 @@ def test_pictures_run_at_the_pace_of_the_steps(env_id):
     single, many = gymnasium.make(env_id), gymnasium.make_vec(env_id, 2)
     for metadata in (single.unwrapped.metadata, many.unwrapped.metadata):
         assert metadata["dt"] * metadata["render_fps"] == pytest.approx(1)
+
+
+def test_the_extra_for_pictures_brings_what_gymnasium_writes_videos_with():
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    names = [re.match(r"[\w-]+", entry).group() for entry in project["optional-dependencies"]["render"]]
+    assert "moviepy" in names  # RecordVideo raises DependencyNotInstalled without it

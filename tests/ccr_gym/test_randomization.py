@@ -218,6 +218,12 @@ def test_robots_that_cannot_be_made_are_named():
         )
 
 
+def test_a_drawn_robot_that_is_too_stiff_for_the_task_names_the_remedy():
+    env = make(randomize={"rigidity": (50, 50)})
+    with pytest.raises(RuntimeError, match="or narrow the ranges of randomize"):
+        env.reset(seed=0)
+
+
 def test_only_the_native_solver_moves_randomised_robots():
     with pytest.raises(ValueError, match="native"):
         make(backend="casadi")

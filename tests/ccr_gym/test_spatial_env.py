@@ -1,10 +1,12 @@
 """The environment in space: force vectors as set-points, obstacle features, settings."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
 
-from ccr_gym import FORCE_SPAN, SpatialPushEnv
+from ccr_gym import EXACT, FORCE_SPAN, SpatialPushEnv
 from solver import Circle, Scene
 from solver.spatial import Cylinder, Sphere
 
@@ -96,3 +98,24 @@ def test_robot_and_backend_are_validated():
         make(backend="casadi")
     with pytest.raises(ValueError, match="not in the plane"):
         make().reset(options={"scene": Scene([Circle(center=(44, 104), radius=15)]), "desired_force": 0.1})
+
+
+@pytest.mark.parametrize("estimator", ["contact", "paper"])
+@pytest.mark.parametrize("sensing", ["ideal", replace(EXACT, tendon_loss=(0.2, 0.2), rigidity_ratio=(1.5, 1.5))])
+def test_the_papers_robot_senses_and_estimates_alike_in_all_quadrants(estimator, sensing):
+    """One displacement of its model is of a pair of opposite cables, of which the sign tells the one that is pulled."""
+    env = gymnasium.make("CCR/SpatialPush-Paper-v1", estimator=estimator, sensing=sensing).unwrapped
+    slices, records = env.observation_slices, []
+    for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        scene = [Sphere(center=(35.0 * x, 35.0 * y, 120.0), radius=15)]
+        env.reset(seed=0, options={"scene": scene, "desired_force": 0.1})
+        pulls = [1.0] * 25 + [-0.3] * 3 + [0.3] * 3
+        steps = [env.step(np.array([x * pull, y * pull], np.float32)) for pull in pulls]
+        rows = np.array([observation[slices["tension"]] for observation, *_ in steps]) if "tension" in slices else 0.0
+        forces = [[np.linalg.norm(info[key]) for key in ("force_true", "force_est")] for *_, info in steps]
+        records.append((np.array(forces), rows))
+    assert records[0][0].min(axis=0) == pytest.approx(0)
+    assert (records[0][0].max(axis=0) > 0).all()
+    for forces, rows in records[1:]:
+        assert forces == pytest.approx(records[0][0], abs=1e-6)
+        assert rows == pytest.approx(records[0][1], abs=1e-6)

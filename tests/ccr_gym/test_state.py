@@ -113,6 +113,43 @@ def test_forks_are_copies_that_part_by_their_actions(sensing):
     assert np.array_equal(env.reset()[0][:2], twin.reset()[0][[2, 2]])  # the generators are copies, too
 
 
+def test_generators_of_another_kind_go_on_too():
+    env, fresh, used = (make("CCR/PushObstacle-v1") for _ in range(3))
+    env.np_random = np.random.Generator(np.random.MT19937(3))
+    used.reset(seed=1)
+    env.reset()
+    state = env.get_state()
+    for other in (fresh, used):
+        other.set_state(state)
+    going = env.reset()
+    for other in (fresh, used):
+        same(going, other.reset())
+
+
+def test_pictures_begin_anew_with_a_state():
+    env, fresh = (make("CCR/PushObstacle-v1", render_mode="rgb_array") for _ in range(2))
+    action = np.ones(1, np.float32)
+    env.reset(seed=0)
+    for _ in range(5):
+        env.step(action)
+    state = env.get_state()
+    for _ in range(7):
+        env.step(action)
+    for each in (env, fresh):
+        each.set_state(state)
+    assert np.array_equal(env.render(), fresh.render())
+
+
+def test_pictures_of_a_fork_are_of_the_episode_that_it_copies():
+    env = make_vec("CCR/PushObstacle-v1", 2, render_mode="rgb_array")
+    env.reset(seed=0)
+    for action in actions_of(env, 5):
+        env.step(action)
+    env.fork([1, 1])
+    first, second = env.render()
+    assert np.array_equal(first, second)
+
+
 def test_states_hold_scenes_of_another_number_of_obstacles():
     env = make("CCR/PushObstacle-v1")
     scene = [Circle(center=(44.0, 104.0), radius=12), Circle(center=(60.0, 150.0), radius=12)]

@@ -117,3 +117,21 @@ def test_bad_actions_are_refused_and_change_nothing():
         with pytest.raises(ValueError, match="finite numbers of shape"):
             env.step(actions)
     same(env.step(np.ones((3, 1))), twin.step(np.ones((3, 1))))
+
+
+def test_pictures_of_a_new_episode_show_nothing_of_the_last_one():
+    action, pictures = np.ones((2, 1), np.float32), []
+    for mode in ("NextStep", "SameStep"):
+        env = gymnasium.make_vec(
+            "CCR/PushObstacle-v1",
+            2,
+            vectorization_mode="vector_entry_point",
+            autoreset_mode=mode,
+            max_episode_steps=5,
+            render_mode="rgb_array",
+        )
+        env.reset(seed=0)
+        for _ in range(5 + (mode == "NextStep")):
+            env.step(action)
+        pictures.append(env.render())
+    assert np.array_equal(*pictures)
