@@ -27,7 +27,8 @@ BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
 PRETENSION = 0.00625 * 1.001  # of the offset: a cable displaced less is practically slack
 REPEATED = ("far", "pinched", "wedged", "unexplained")  # reasons that repeats show
-REPEATS = 300  # of a command that was given up on, each of which must come nearer
+REPEATS = 300  # of a command that was given up on, each of which must move a cable or the base
+STILL = 1e-6  # by more than this of the offset, or of the length
 PINCHED = 100  # of EI/L²: a contact force far beyond what bends the robot
 STALLED_AGAIN = 3  # stalled steps of an episode that are repeated
 MOVED_ON = 1e-4  # of the offset: a repeated command that stalled must not lead farther
@@ -214,10 +215,10 @@ def _reason(solver, taken, k, repeats=REPEATS):
     At once or after repeats, ``folded``: the branch ends where a segment of the paper's models folds over; ``slack``:
     without pretension the shape of the paper's model is undetermined; ``crossing``: the pulled cable of a pair changes
     in contact, where the shape of the paper's model jumps. ``far``: the command exceeds the work of one step; each
-    repeat comes nearer, until one ends with another status. ``pinched``: no repeat comes nearer any more, and obstacles
+    repeat moves on, until one ends with another status. ``pinched``: no repeat moves on any more, and obstacles
     squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or draws it, or a cable of
     the paper's models pushes it, into a place that is too narrow, and these models set no limit to that. ``wedged``: no
-    repeat comes nearer any more, and by the slopes of the closed gaps alone no motion does. ``holes meet``: two holes
+    repeat moves on any more, and by the slopes of the closed gaps alone no motion does. ``holes meet``: two holes
     of a taut cable do, where its length has no slope. ``buckled``: the work of one step is spent while cables, which no
     limit stops before, pull against each other so much that segments bend to and fro, from pattern to pattern in many
     small snaps.
@@ -259,10 +260,10 @@ def _near_zero(state, command):
 
 
 def _repeated(solver, state, command, repeats):
-    """Return where a command leads that is repeated as long as it comes nearer."""
+    """Return where a command leads that is repeated as long as it moves any cable: one may let out for another."""
     for _ in range(repeats):
         before, state = state, step(solver, state, command)
-        if state.status != Status.GAVE_UP or not _distance(state, command) < _distance(before, command):
+        if state.status != Status.GAVE_UP or _distance(state, command_of(before)) <= STILL:
             break
     return state
 

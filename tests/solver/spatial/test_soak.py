@@ -32,6 +32,13 @@ def test_nothing_is_found_in_random_episodes():
     assert tally.certified > 0
 
 
+def test_a_command_is_repeated_while_one_cable_lets_out_for_another():
+    """The repeats end where a pair's pulled cable changes in contact, which the first one does not show."""
+    tally, cases = play(Episode("space", 1170, 489, 40))
+    assert cases == []
+    assert tally.reasons == {"crossing": 1}
+
+
 def test_a_step_among_contacts_that_wedge_the_robot_stalls_when_it_is_repeated():
     """Its tensions double within less than the smallest sub-step, in the course of which no descent leads on."""
     setting, generator = setting_of(Episode("space", 31, 17, 500))
