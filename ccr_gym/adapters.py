@@ -154,7 +154,7 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         return self.bounded(self.actuation.reached(commanded_mm, self.layout.cables(blocks)))
 
     def signed(self, blocks: np.ndarray, tensions: np.ndarray) -> np.ndarray:
-        """Return tensions ``(..., cables)`` with the signs of displacements that stand for a pair of opposite cables."""
+        """Return tensions ``(..., cables)`` with the signs of displacements that stand for pairs of opposite cables."""
         return tensions
 
     def info(self, blocks: np.ndarray, index: int | slice) -> dict[str, Quantity]:
