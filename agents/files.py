@@ -45,10 +45,10 @@ def check_writable(*paths: Path) -> None:
     """
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(PARTIAL + path.name)
         try:
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            partial = path.with_name(PARTIAL + path.name)
             partial.touch()
             partial.unlink()
         except OSError as error:

@@ -156,7 +156,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             TypeError: If it is no such state.
             ValueError: If it is that of a vector environment, or of another robot.
         """
-        check_state(state, 1)
+        check_state(state, [self._np_random])
         if state.episodes is not None:
             self._episodes.set_rows([0], state.episodes)
         self._started = state.episodes is not None

@@ -1,6 +1,6 @@
 """States of environments, taken out and put back: planning on copies, forks, exact continuation elsewhere."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter
@@ -13,6 +13,7 @@ from solver import Scene
 from solver.common.rows import Rows, as_slice, copies
 
 Arrays = dict[str, np.ndarray]
+GENERATORS = ("MT19937", "PCG64", "PCG64DXSM", "Philox", "SFC64")  # NumPy's kinds
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,17 +76,23 @@ def put(owner: object, arrays: Arrays, robots: list[int]) -> None:
         getattr(owner, name)[at] = rows
 
 
-def check_state(state: object, count: int) -> None:
-    """Check that a state is one of this number of environments.
+def check_state(state: object, generators: Sequence[np.random.Generator | None]) -> None:
+    """Check that a state is one of environments with these generators.
 
     Raises:
         TypeError: If it is no state.
-        ValueError: If it is of another number of environments.
+        ValueError: If it is of another number of environments, or of generators that cannot be made here.
     """
     check_type("state", state, EnvState, "what get_state() returns")
     assert isinstance(state, EnvState)
-    if len(state.generators) != count:
-        raise ValueError(f"state is of {len(state.generators)} environments; it must be of {count}")
+    if len(state.generators) != len(generators):
+        raise ValueError(f"state is of {len(state.generators)} environments; it must be of {len(generators)}")
+    for own, given in zip(generators, state.generators, strict=True):
+        if given is not None and given["bit_generator"] not in (*GENERATORS, _kind(own)):
+            raise ValueError(
+                f"the state is of a generator {given['bit_generator']!r}; it must be one of {', '.join(GENERATORS)}, "
+                "or of the same kind as the environment's np_random"
+            )
 
 
 def check_alike(own: Mapping[str, object], given: Mapping[str, object]) -> None:
@@ -111,8 +118,11 @@ def restored(generator: np.random.Generator | None, state: Mapping[str, Any] | N
     """Return a generator in a state, the given one if it is of the same kind; None for none."""
     if state is None:
         return None
-    kind = state["bit_generator"]
-    if generator is None or type(generator.bit_generator).__name__ != kind:
-        generator = np.random.Generator(getattr(np.random, kind)(0))
+    if generator is None or _kind(generator) != state["bit_generator"]:
+        generator = np.random.Generator(getattr(np.random, state["bit_generator"])(0))
     generator.bit_generator.state = state
     return generator
+
+
+def _kind(generator: np.random.Generator | None) -> str | None:
+    return None if generator is None else type(generator.bit_generator).__name__

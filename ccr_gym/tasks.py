@@ -27,7 +27,9 @@ BREATHS = 64  # as many as an episode can have, and more
 LEVELS = (0.3, 1.0)  # range of the levels of a moving set-point, before they are scaled to a maximum of 1
 FARTHEST = 10.0  # coordinate of an obstacle, far beyond what a robot reaches [L]
 PLACE = {"low": -FARTHEST, "high": FARTHEST}
-CIRCLE: tuple[dict[str, float], ...] = (PLACE, PLACE, {"low": SMALLEST})  # bounds of x, y and radius
+RADIUS = {"low": SMALLEST, "high": FARTHEST}
+CIRCLE: tuple[dict[str, float], ...] = (PLACE, PLACE, RADIUS)  # bounds of x, y and radius
+SPRING = {"low": 1e-6, "high": 1e6}  # of an obstacle that is hardly there, or hardly moves [EI/L³]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +68,7 @@ class PushObstacle(Task[Robot]):
 
     x: Range = checked((0.2, 0.42), check_range, **PLACE)
     y: Range = checked((0.42, 0.83), check_range, **PLACE)
-    radius: Range = checked((0.056, 0.09), check_range, low=SMALLEST)
+    radius: Range = checked((0.056, 0.09), check_range, **RADIUS)
     force: Range = checked((0.4, 2.9), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
@@ -150,7 +152,7 @@ class SoftObstacle(PushObstacle):
         force: Range of the set-point, that of the load cell; it moves the softest obstacle by up to 0.15 L [EI/L²].
     """
 
-    spring: Range = checked((10.0, 350.0), check_range, low=SMALLEST)
+    spring: Range = checked((10.0, 350.0), check_range, **SPRING)
     force: Range = checked((0.2, 1.5), check_force_range)
 
     def sample(self, robot: Robot, generator: np.random.Generator) -> Assignment:
@@ -206,7 +208,7 @@ class InsertAndPush(PushObstacle):
     adapter: ClassVar[type[AnyAdapter]] = InsertionAdapter
 
     y: Range = checked((0.47, 0.8), check_range, **PLACE)
-    radius: Range = checked((0.064, 0.1), check_range, low=SMALLEST)
+    radius: Range = checked((0.064, 0.1), check_range, **RADIUS)
     force: Range = checked((0.2, 1.5), check_force_range)  # as BracedPush
 
 
@@ -229,7 +231,7 @@ class SpatialPush(Task[SpatialRobot]):
 
     distance: Range = checked((0.2, 0.36), check_range, low=0, high=FARTHEST)
     height: Range = checked((0.45, 0.83), check_range, **PLACE)
-    radius: Range = checked((0.056, 0.09), check_range, low=SMALLEST)
+    radius: Range = checked((0.056, 0.09), check_range, **RADIUS)
     cylinder_fraction: float = checked(0.5, check_number, low=0, high=1)
     max_tilt: float = checked(math.pi / 6, check_number, low=0, high=math.pi / 2)
     force: Range = checked((0.4, 2.9), check_force_range)

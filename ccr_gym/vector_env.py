@@ -161,7 +161,7 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
             TypeError: If it is no such state.
             ValueError: If it is of another number of environments, or of another robot.
         """
-        check_state(state, self.num_envs)
+        check_state(state, self._generators)
         if state.episodes is not None:
             self._episodes.set_rows(list(range(self.num_envs)), state.episodes)
         self._started = state.episodes is not None

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from agents.config import CURVE_POINTS, VALIDATION_EPISODES, VALIDATION_SEED, TrainConfig, check_parallel
 from agents.errors import UserError
 from agents.files import LOCK, PARTIAL, locked
-from agents.learning.actor import ACTOR, LearningCurve, TrainingRecord, export
+from agents.learning.actor import ACTOR, LearnedPolicy, LearningCurve, TrainingRecord, export
 from agents.learning.checkpoint import CHECKPOINT, TrainingRun, learner_state, restore_learner
 from agents.learning.distillation import distill
 from agents.learning.learners import make_envs, make_learner, normalized_envs, play_on
@@ -121,7 +121,7 @@ def is_finished(config: TrainConfig) -> bool:
     """Return whether the run's folder holds its result, and the run is not to be restarted.
 
     Raises:
-        UserError: If it holds a run with other settings, or other files.
+        UserError: If it holds a run with other settings, or other files, or if its result is damaged.
     """
     path = config.run / CONFIG
     if path.is_file():
@@ -129,7 +129,10 @@ def is_finished(config: TrainConfig) -> bool:
             raise UserError(f"{config.run} holds a run with other settings; choose another folder, or use --restart")
     elif config.run.is_dir():
         _refuse_other_files(config.run)
-    return (config.run / ACTOR).is_file() and not config.restart
+    if config.restart or not (config.run / ACTOR).is_file():
+        return False
+    LearnedPolicy(config.run)
+    return True
 
 
 def _refuse_other_files(folder: Path) -> None:

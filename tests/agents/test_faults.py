@@ -80,6 +80,8 @@ def assert_one_line(code, lines, *words):
         (("reproduce", "--out", "file"), "file"),
         (("bench", "--json", "file/bench.json"), "file"),
         (("bench", "--json", "taken"), "taken cannot be written: Is a directory"),
+        (("bench", "--json", "."), ". cannot be written: Is a directory"),
+        (("bench", "--json", "/"), "/ cannot be written: Is a directory"),
         (("reproduce", "--out", "out"), "out/paper.json cannot be written: Is a directory"),
         (("evaluate", "--out", "out", "--policies", "PI"), "out/evaluation.json cannot be written: Is a directory"),
         (("retrain", "--out", "file", "--jobs", "1", "--seeds", "1"), "file"),

@@ -126,6 +126,31 @@ def test_generators_of_another_kind_go_on_too():
         same(going, other.reset())
 
 
+class ForeignBits(np.random.PCG64):
+    """Bits of another package, of which a state holds the name alone."""
+
+
+@pytest.mark.parametrize("vector", [False, True])
+def test_a_generator_that_cannot_be_made_is_refused_and_changes_nothing(vector):
+    env, other = (make_vec("CCR/PushObstacle-v1", 1) if vector else make("CCR/PushObstacle-v1") for _ in range(2))
+    for each in (env, other):
+        each.reset(seed=1)
+    foreign = np.random.Generator(ForeignBits(3))
+    if vector:
+        other._generators = [foreign]
+    else:
+        other.np_random = foreign
+    other.reset()
+    state, twin = other.get_state(), copy.deepcopy(env)
+    with pytest.raises(ValueError, match="generator 'ForeignBits'; it must be one of MT19937"):
+        env.set_state(state)
+    same(env.step(env.action_space.sample() * 0), twin.step(env.action_space.sample() * 0))
+    same(env.reset(), twin.reset())
+    going = other.reset()
+    other.set_state(state)  # its own generator is of that kind
+    same(going, other.reset())
+
+
 def test_pictures_begin_anew_with_a_state():
     env, fresh = (make("CCR/PushObstacle-v1", render_mode="rgb_array") for _ in range(2))
     action = np.ones(1, np.float32)

@@ -260,6 +260,18 @@ def test_a_finished_run_stays_and_begins_again_if_asked(tmp_path):
     assert TrainConfig.load(tmp_path / training.CONFIG).seed == 5
 
 
+def test_a_finished_run_whose_policy_is_damaged_says_so(tmp_path):
+    config = TrainConfig(run=tmp_path, learner=SMALL["PPO"], threads=1)
+    train(config, progress=False)
+    whole = (tmp_path / ACTOR).read_bytes()
+    (tmp_path / ACTOR).write_bytes(whole[:-1])
+    with pytest.raises(UserError, match=r"is not a trained policy.*remove it, and train again"):
+        train(config, progress=False)
+    assert (tmp_path / ACTOR).read_bytes() == whole[:-1]
+    (tmp_path / ACTOR).unlink()
+    LearnedPolicy(train(config, progress=False))
+
+
 @pytest.mark.parametrize("learner", [SMALL["PPO"], IMITATION], ids=lambda s: s.name)
 def test_only_the_event_files_of_the_run_are_deleted(tmp_path, monkeypatch, learner):
     monkeypatch.setattr(distillation, "VALIDATION_EPISODES", 2)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from agents import cli, estimate_log, read_instruments, read_log
+from agents.replay import run as replay
 from agents.replay.log import Log
 from ccr_gym import PushObstacleEnv, SpatialPushEnv
 from solver import Actuation, Cable, Circle, Robot, Scene
@@ -137,6 +138,22 @@ def test_errors_are_one_line(tmp_path, monkeypatch, capsys):
     assert (
         capsys.readouterr().err == f"ccr-gym: {log}, row 2, column tension_n: 'x' is not a number up to 1e+09 in size\n"
     )
+
+
+def test_results_that_cannot_be_written_are_named_before_the_work(tmp_path, monkeypatch, capsys):
+    def work(*_):
+        raise AssertionError("worked in vain")
+
+    monkeypatch.setattr(replay, "estimate_log", work)
+    taken = tmp_path / "estimate.png"
+    taken.mkdir()
+    files = ["--robot", EXAMPLE / "robot.json", "--scene", EXAMPLE / "scene.json", "--out", tmp_path]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", "estimate", *map(str, [EXAMPLE / "log.csv", *files])])
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    assert caught.value.code == 2
+    assert capsys.readouterr().err == f"ccr-gym: {taken} cannot be written: Is a directory\n"
+    assert list(tmp_path.iterdir()) == [taken]
 
 
 def test_a_missing_file_is_one_line(tmp_path, monkeypatch, capsys):
