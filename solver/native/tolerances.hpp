@@ -113,12 +113,13 @@ inline constexpr int kDescentIterations = 300;
 inline constexpr int kShearingIterations = 1000;  // the same of the paper's models, which may shear segment by segment
 inline constexpr int kFinishEvery = 8;            // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;       // largest step of one iterate
-inline constexpr int kLongDescent = 100;          // iterates of the paper's models, after which they may be
+inline constexpr int kLongDescent = 100;          // iterates, after which those of the paper's models may be
 inline constexpr double kDescentStride = 0.1;     // as large as this
 inline constexpr double kSmallestPart =
     1e-3;  // smallest first step of a descent, as a fraction of the sub-step that ended the branch
-inline constexpr double kCreep = 1e-4;                // size of an iterate that hardly moves
-inline constexpr double kStretch = 8.0;               // growth of damped iterates that succeed
+inline constexpr double kCreep = 1e-4;    // size of an iterate that hardly moves
+inline constexpr double kOvershot = 0.7;  // part of an iterate of a long descent, where the energy is least on its way
+inline constexpr double kStretch = 8.0;   // growth of damped iterates that succeed
 inline constexpr double kDescentFeasibility = 6e-14;  // [L]
 inline constexpr double kHeld = 1e100;                // multiplier that keeps a gap in the active set of a restoration
 inline constexpr double kEnergyRoundoff = 1e-15;

@@ -91,27 +91,6 @@ bool Newton<Model>::factor_damped(const ActiveSet& active) {
   return false;
 }
 
-// Factors with so much more damping that H is positive definite.
-template <class Model>
-bool Newton<Model>::factor_definite() {
-  damping_ = std::max(damping_, kDamping * kkt_.max_curvature());
-  for (int attempt = 0; attempt < kDampingTries; ++attempt, damping_ *= kDampingGrowth)
-    if (kkt_.factor(damping_) && kkt_.negative == 0) {
-      needed_damping_ = damping_;
-      return true;
-    }
-  return false;
-}
-
-// Factors the metric of `restore`, which is positive definite.
-template <class Model>
-bool Newton<Model>::factor_metric() {
-  double damping = damping_ + kNormDamping * kkt_.max_curvature();
-  for (int attempt = 0; attempt < kDampingTries; ++attempt, damping *= kDampingGrowth)
-    if (kkt_.factor(damping) && kkt_.negative == 0) return true;
-  return false;
-}
-
 template <class Model>
 double Newton<Model>::step_size(const Direction<Model>& step) const {
   double longest = 0;
@@ -157,9 +136,7 @@ double Newton<Model>::line_search(const Iterate& at, const ActiveSet& target, do
     if (problem.evaluate(trial_)) return 1;
     return 0;
   }
-  double slope = 0;  // of the energy along the step
-  for (std::size_t i = 0; i < step_.controls.size(); ++i) slope += dot(problem.gradient()[i], step_.controls[i]);
-  for (std::size_t m = 0; m < step_.mounts.size(); ++m) slope += dot(problem.mount_gradient()[m], step_.mounts[m]);
+  double slope = slope_along_step();  // of the energy
   for (int j = 0; j < at.active.count; ++j)
     slope += at.active.multiplier[j] * problem.slope(at.active.contact[j]).along(step_);
   for (int j = 0; j < target.count; ++j) weight = std::max(weight, 2 * target.multiplier[j]);
@@ -240,45 +217,6 @@ bool Newton<Model>::settle(Iterate& at) {
   return false;
 }
 
-template <class Model>
-bool Newton<Model>::set_metric(const Iterate& at) {
-  needed_damping_ = 0;
-  stretch_ = kStretch;
-  creeping_ = false;
-  lowest_ = HUGE_VAL;
-  flat_ = fruitless_ = dropped_ = 0;
-  exchanged_ = -1;
-  if (!problem.evaluate(at)) return false;
-  problem.reduced_gradient(at.active);
-  return factor_convexified(at.active, kDescentPenalties) && factor_metric();
-}
-
-template <class Model>
-bool Newton<Model>::restore(Iterate& at) {
-  if (!problem.evaluate(at)) return false;
-  for (int attempt = 0; attempt < kRestorations; ++attempt) {
-    if (gaps_closed(at.active, kDescentFeasibility)) return true;
-    ActiveSet held = at.active;
-    if (!qp_.restore(problem, kkt_, held, correction_)) return false;
-    if (!(step_size(correction_) <= kDescentCap)) return false;
-    advance(at, 1, correction_, at);
-    if (!problem.evaluate(at)) return false;
-  }
-  return gaps_closed(at.active, kDescentFeasibility);
-}
-
-// The contacts of a set whose gap is closed: an open gap carries no multiplier.
-template <class Model>
-ActiveSet Newton<Model>::closed_contacts(const ActiveSet& active) const {
-  ActiveSet kept;
-  for (int j = 0; j < active.count; ++j) {
-    if (problem.gaps()[active.contact[j]] > kFeasibility * problem.robot().max_length) continue;
-    kept.contact[kept.count] = active.contact[j];
-    kept.multiplier[kept.count++] = active.multiplier[j];
-  }
-  return kept;
-}
-
 // Whether no gap is violated and the active ones are closed.
 template <class Model>
 bool Newton<Model>::gaps_closed(const ActiveSet& active, double tolerance) const {
@@ -287,58 +225,13 @@ bool Newton<Model>::gaps_closed(const ActiveSet& active, double tolerance) const
   return farthest <= tolerance * problem.robot().max_length;
 }
 
+// Slope of the Lagrangian along `step_`, where its gradient was taken last.
 template <class Model>
-NewtonResult Newton<Model>::descend_once(Iterate& at, double largest, bool definite) {
-  NewtonResult result;
-  if (!problem.evaluate(at)) return result;
-  choose_test();
-  problem.reduced_gradient(at.active);
-  const bool stationary = is_equilibrium(at.active);
-  result.converged = stationary && factor_stable(at.active, kPenalties);
-  if (result.converged || !factor_convexified(at.active, creeping_ ? kPenalties : kDescentPenalties)) return result;
-  const bool flat = is_flat(at.active);
-  if (fruitless_ > kFruitless) return result;
-  if (flat && exchange_dependent(at.active)) {
-    problem.reduced_gradient(at.active);
-    if (!factor_convexified(at.active, kDescentPenalties)) return result;
-  }
-  if (stationary || (flat && damping_ > 0)) {
-    result.moved = leave_saddle(at, largest);
-    if (result.moved || !factor_convexified(at.active, kDescentPenalties)) return result;
-  }
-  ActiveSet target = at.active;
-  if (definite || (!qp_.solve(problem, kkt_, target, step_) &&  // not stable without a gap that it drops
-                   !((flat || ++dropped_ > kFlat) && release_lowest(at, target)))) {
-    target = at.active;
-    if (!kkt_.counts_inertia || !factor_definite() || !qp_.solve(problem, kkt_, target, step_)) return result;
-  }
-  const double allowed = problem.energy() + rise_of_roundoff(target);
-  const double size = step_size(step_), whole = std::min(1.0, largest / size);
-  trial_.command = at.command;
-  const ActiveSet touching = closed_contacts(target);
-  // Where H is not positive definite, the energy keeps falling beyond the end of a damped step.
-  const bool stretched = damping_ > 0 && touching.count == target.count;
-  const double farthest = stretched ? std::min(stretch_, largest / size) : whole;
-  double scale = farthest;
-  // The norm of restorations: near a fold the energy hardly resists the motion that ends the branch, so damping is
-  // added.
-  if (!factor_metric()) return result;
-  for (int backtracks = 0; backtracks <= kDescentBacktracks; ++backtracks, scale /= scale > 2 * whole ? kStretch : 2) {
-    trial_.active = scale == 1 ? target : touching;  // the whole step closes every gap with a multiplier
-    advance(at, scale, step_, trial_);
-    if (!restore(trial_)) continue;
-    // A step beyond a corner may be restored to where it began.
-    if (problem.energy() > allowed || !has_moved(at, kProgress * scale * size)) continue;
-    std::swap(at.controls, trial_.controls);
-    std::swap(at.mounts, trial_.mounts);
-    at.active = closed_contacts(target);
-    result.moved = true;
-    // Heavily damped steps are too short far from the end of a descent; near it a stronger penalty instead is harmless.
-    creeping_ = !creeping_ && scale * size < kCreep;
-    if (stretched) stretch_ = scale == farthest ? kStretch * scale : std::max(kStretch, scale);
-    return result;
-  }
-  return result;
+double Newton<Model>::slope_along_step() const {
+  double slope = 0;
+  for (std::size_t i = 0; i < step_.controls.size(); ++i) slope += dot(problem.gradient()[i], step_.controls[i]);
+  for (std::size_t m = 0; m < step_.mounts.size(); ++m) slope += dot(problem.mount_gradient()[m], step_.mounts[m]);
+  return slope;
 }
 
 #define CCR_INSTANTIATE(Model) template class Newton<Model>;

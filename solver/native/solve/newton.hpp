@@ -85,10 +85,12 @@ class Newton {
   bool factor_definite();
   bool factor_metric();
   double step_size(const Direction<Model>& step) const;
+  double slope_along_step() const;
   double rise_of_roundoff(const ActiveSet& active) const;
   bool has_moved(const Iterate& from, double least) const;
   bool is_flat(const ActiveSet& active);
   bool find_softest(const ActiveSet& held);
+  bool take_step(Iterate& at, const ActiveSet& target, double largest);
   bool leave_saddle(Iterate& at, double largest);
   double merit(double weight) const;
   double line_search(const Iterate& at, const ActiveSet& target, double& weight);
@@ -106,6 +108,7 @@ class Newton {
   double lowest_ = 0;          // energy of this descent when it fell last
   int fruitless_ = 0;          // iterates since then,
   int flat_ = 0;               // and since a saddle was suspected
+  int iterates_ = 0;           // of this descent
   int exchanged_ = -1;         // the last gap that took the place of one that it depends on
   int dropped_ = 0;            // iterates that would not be stable without a gap that they drop
 };

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Cable, Load, Scene, Status
-from solver.spatial import HalfSpace, SpatialRobot, SpatialSolver, Sphere
+from solver.spatial import Box, HalfSpace, SpatialRobot, SpatialSolver, Sphere
 
 
 def test_a_descent_that_loses_no_energy_leaves_a_wedged_robot_the_work_to_reach_its_tension_limit():
@@ -135,3 +135,22 @@ def test_the_other_cable_of_a_pair_is_pulled_in_contact(walls, start, goal):
     assert state.tensions.max() == pytest.approx(15, rel=1e-6)
     assert state.cables_mm[1] * goal[1] > 0
     assert_certified(state)
+
+
+def test_a_long_descent_does_not_go_from_side_to_side_of_a_valley():
+    """A rod let go from a box on a soft spring, whose damped iterates took twice the way to the least energy."""
+    robot = SpatialRobot.prototype(between=2)
+    box = Box(
+        center=(0.0, 14.531591008141536, 144.6232435068666),
+        sizes=(122.04193760177834, 12.503141346941263, 18.75471202041189),
+        edge=0.12106603270416377,
+        axis=(0.0, 0.0, 1.0),
+        second=(0.0, 1.0, 0.0),
+        spring=0.0006281891451149069,
+    )
+    solver = SpatialSolver(robot, Scene([box]))
+    pulled = solver.step(solver.rest(), (5.55187, 11.44954))
+    released = solver.step(pulled, (-0.22266, -0.45918))
+    assert released.status is Status.SNAPPED
+    assert released.factorizations < 2000
+    assert max(solver.optimality(released)) < 1e-8
