@@ -110,8 +110,9 @@ bool Newton<Model>::take_step(Iterate& at, const ActiveSet& target, double large
   // Where H is not positive definite, the energy keeps falling beyond the end of a damped step.
   const bool stretched = damping_ > 0 && touching.count == target.count;
   const double farthest = stretched ? std::min(stretch_, largest / size) : whole;
-  // From side to side of a valley a long descent loses little: once, it goes to where the energy is least by a parabola.
-  bool may_overshoot = Model::kRod && ++iterates_ > kLongDescent && stretched;
+  // From side to side of a valley a long descent loses little: once, it goes to where the energy is least by a
+  // parabola. The paper's models in the plane stride instead.
+  bool may_overshoot = (Model::kRod || Model::kSpace == 3) && ++iterates_ > kLongDescent && stretched;
   const double before = problem.energy(), slope = may_overshoot ? slope_along_step() : 0;
   // The norm of restorations: near a fold the energy hardly resists the motion that ends the branch, so damping is
   // added.

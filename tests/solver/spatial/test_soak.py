@@ -39,6 +39,14 @@ def test_a_command_is_repeated_while_one_cable_lets_out_for_another():
     assert tally.reasons == {"crossing": 1}
 
 
+def test_a_long_descent_ends_where_a_segment_folds_over():
+    """It used to go from side to side of a valley until its work was spent."""
+    tally, cases = play(Episode("space", 1170, 1052, 380))
+    assert cases == []
+    assert set(tally.reasons) == {"folded"}
+    assert tally.most_factorizations < 4000
+
+
 def test_a_step_among_contacts_that_wedge_the_robot_stalls_when_it_is_repeated():
     """Its tensions double within less than the smallest sub-step, in the course of which no descent leads on."""
     setting, generator = setting_of(Episode("space", 31, 17, 500))
