@@ -22,7 +22,6 @@ SAME_WAY = 0.1  # distance of unit vectors to their commands: and in this direct
 MOST_BLOCKED = 3  # blocked steps of an episode that are retried in other ways
 DEEPEST = 1e-12  # of the robot's length
 INSIDE = 1e-11  # of the robot's length, by the distances in numpy, which round differently
-ROUNDOFF = 1e-12
 BAND = 1e-6  # of the tension limit
 OPTIMAL = 1e-8
 PRETENSION = 0.00625 * 1.001  # of the offset: a cable displaced less is practically slack
@@ -77,7 +76,8 @@ def _states(solver, numbers, tally):
     finite = (np.isfinite(numbers.blocks) | np.isposinf(numbers.blocks)).all(axis=1)
     least = numbers.gaps.min(axis=(1, 2, 3), initial=math.inf) / length
     inside = _least_distance(solver, numbers) / length
-    edges = np.linalg.norm(np.diff(numbers.points, axis=2), axis=-1).max(axis=2) / robot.edges_mm
+    edges = np.linalg.norm(np.diff(numbers.points, axis=2), axis=-1).max(axis=2) - robot.edges_mm
+    longer = edges.max(axis=1) / length  # than the longest that there can be, which holds up to the gap of its disks
     tension = numbers.tensions.max(axis=1) / robot.max_tension
     tally.contact += int(numbers.touching[1:].sum())
     tally.least_gap = min(tally.least_gap, least.min(initial=math.inf))
@@ -88,7 +88,7 @@ def _states(solver, numbers, tally):
         *_first("not finite", ~finite, least),
         *_first("gap", least < -DEEPEST, least),
         *_first("penetration", inside < -INSIDE, inside),
-        *_first("edge", edges.max(axis=1) > 1 + ROUNDOFF, edges.max(axis=1)),
+        *_first("edge", longer > DEEPEST, longer),
         *_first("tension", tension > 1 + BAND, tension),
         *_first("factorizations", work > MOST_FACTORIZATIONS, work),
     ]
