@@ -142,6 +142,14 @@ double ActiveSetQp<Model>::combine(int count, Multipliers& trade) const {
   return curvature;
 }
 
+// Leaves out of the combination that a dependent gap is what comes of roundoff: a gap that has no part in it would seem
+// to be released.
+template <class Model>
+void ActiveSetQp<Model>::drop_roundoff(int count, double full, Multipliers& trade) const {
+  for (int j = 0; j < count; ++j)
+    if (trade[j] * trade[j] * std::abs(along(j, responses_[j])) <= kNoPart * full) trade[j] = 0;
+}
+
 // The active gap whose multiplier is the first to vanish as a combination is taken off, or -1; and how much of it is
 // then.
 template <class Model>
@@ -171,10 +179,12 @@ bool ActiveSetQp<Model>::add_violated_gap(const ContactProblem& problem, KktSyst
     const Direction& response = responses_[count];
     if (factor_gram(active) != Gram::kSound) return false;
     Multipliers trade;
-    const double curvature = combine(count, trade);
+    const double curvature = combine(count, trade), full = std::abs(along(count, response));
+    const bool depends = !(curvature > kDependent * full);
+    if (depends) drop_roundoff(count, full, trade);
     const auto [blocking, to_release] = first_released(active, trade);
     const double shortfall = -problem.gaps()[contact] - along(count, step);
-    const double to_close = curvature > kDependent * std::abs(along(count, response)) ? shortfall / curvature : kNever;
+    const double to_close = depends ? kNever : shortfall / curvature;
     const double length = std::min(to_release, to_close);
     if (!(length < kNever)) {
       conflict_ = active;

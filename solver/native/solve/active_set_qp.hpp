@@ -74,6 +74,7 @@ class ActiveSetQp {
   void apply(const Multipliers& change, ActiveSet& active, Direction& step) const;
   bool add_violated_gap(const ContactProblem& problem, KktSystem& kkt, int contact, ActiveSet& active, Direction& step);
   double combine(int count, Multipliers& trade) const;
+  void drop_roundoff(int count, double full, Multipliers& trade) const;
   std::pair<int, double> first_released(const ActiveSet& active, const Multipliers& trade) const;
   int most_violated(const ContactProblem& problem, const ActiveSet& active, const Direction& step,
                     double tolerance) const;

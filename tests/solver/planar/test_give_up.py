@@ -1,10 +1,11 @@
 """Steps that used to be given up on, though the robot has somewhere to go on to."""
 
+import math
 from dataclasses import replace
 
 import pytest
 
-from solver import Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver, Status
+from solver import Cable, Capsule, Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver, Status
 
 PAPER = replace(Robot.prototype(model="paper"), model="paper", touch=("backbone", "cable"), between=0)
 SMALL = replace(PAPER, length_mm=12.45, offset_mm=0.8, disk_radius_mm=0.8, rigidity=50.0, max_cable_mm=2.513)
@@ -144,3 +145,19 @@ def test_not_given_up(robot, scene, commands):
         assert equilibrium.status is not Status.GAVE_UP
         residuals = equilibrium.residuals()
         assert max(residuals.stationarity, residuals.lengths, residuals.gaps, residuals.complementarity) <= 1e-8
+
+
+def test_a_cable_that_is_as_short_as_it_can_be_stalls_at_its_limit():
+    """It ends at the second disk: where these meet, its motor pulls against them, whatever else touches the robot."""
+    cables, lines = (Cable(end=2), Cable(angle=math.pi)), ("backbone", "cable")
+    robot = Robot.prototype(max_tension=100.0, cables=cables, touch=lines, disk_radius_mm=8.0, max_cable_mm=25.13)
+    circles = (((58.84, 122.16), 15.46), ((67.85, 93.05), 10.26), ((57.84, 84.75), 14.28))
+    solver = Solver(robot, Scene(Circle(center=center, radius=radius) for center, radius in circles))
+    state = solver.rest()
+    for command in ((16.98, 9.03), (18.5, -2.09), (19.97, -21.56), (20.93, -25.13)):
+        state = solver.step(state, command)
+    assert state.contact.any()
+    assert state.status is Status.STALLED
+    assert state.cables_mm[0] == pytest.approx(2 * robot.segment_mm, abs=1e-6)
+    assert state.tensions[0] == pytest.approx(100.0, rel=1e-5)
+    assert max(solver.optimality(state)) < 1e-8
