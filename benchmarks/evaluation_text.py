@@ -98,7 +98,8 @@ def events(evaluation: Found) -> str:
     plane, space = (max(few[key] for key in few if ("Spatial" in key[1]) == where) for where in (False, True))
     many = [f"{policy} on `{env_id}` ({share:.0%})" for (policy, env_id), share in shares.items() if share > MANY]
     text = f"At most {plane:.2%} of the steps in the plane and {space:.2%} in space snap, stall or are blocked"
-    return f"{text}; above 1% are {' and '.join(many) or 'none'}.".replace("%", " %")
+    exceptions = f", but for {' and '.join(many)}" if many else ""
+    return f"{text}{exceptions}.".replace("%", " %")
 
 
 def headroom_table(rows: Sequence[Found]) -> str:

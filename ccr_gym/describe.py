@@ -87,8 +87,8 @@ def _rewards(settings: AnySettings, space: int) -> str:
     """Return the text of the rewards."""
     weights = settings.weights
     kind = "magnitudes, or vectors with `force_vector` where they are subtracted" if space == 3 else "magnitudes"
-    return f"""The sum of named terms, each in `info` as `reward_…`; F is the energy-based contact force, F_d the
-        set-point, {kind}: `force_error` −{weights.force_error:g} min(|F−F_d|/F_d, 1); `accuracy` {weights.accuracy:g}
+    return f"""The sum of named terms, each in `info` as `reward_…`; F is the regulated force, F_d the set-point,
+        {kind}: `force_error` −{weights.force_error:g} min(|F−F_d|/F_d, 1); `accuracy` {weights.accuracy:g}
         exp(−{ACCURACY_RATE:g} |F−F_d|/F_d); `overshoot` −{weights.overshoot:g} min(max(F/F_d−1, 0), 1); `approach`
         −{weights.approach:g} min(clearance / {CLEARANCE_SPAN:.3g} L, 1) while nothing touches; `effort`
         −{weights.effort:g} times the mean square of the action."""
