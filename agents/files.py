@@ -17,6 +17,15 @@ LOCK = ".lock"
 
 
 @contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Report every fault of the disk as one of a file that cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+@contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path with the same suffix, whose file replaces ``path`` once it is on the disk.
 
@@ -25,12 +34,11 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     partial = path.with_name(PARTIAL + path.name)
     try:
-        yield partial
-        with partial.open("rb") as written:
-            os.fsync(written.fileno())
-        partial.replace(path)
-    except OSError as error:
-        raise UserError(f"{path} cannot be written: {error.strerror or error}") from error
+        with _writing(path):
+            yield partial
+            with partial.open("rb") as written:
+                os.fsync(written.fileno())
+            partial.replace(path)
     finally:
         with contextlib.suppress(OSError):  # it is not there, also on a disk that cannot be written
             partial.unlink()
@@ -45,14 +53,12 @@ def check_writable(*paths: Path) -> None:
     """
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
+        with _writing(path):
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             partial = path.with_name(PARTIAL + path.name)
             partial.touch()
             partial.unlink()
-        except OSError as error:
-            raise UserError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def write_text(path: Path, text: str) -> None:

@@ -14,10 +14,7 @@ using namespace tolerances;
 template <class Model>
 bool ActiveSetQp<Model>::find_softest(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active,
                                       Direction& seed, Direction& softest) {
-  negative_ = kkt.negative;
-  for (int j = 0; j < active.count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
-  kkt.solve(problem, std::span(loads_).first(active.count));
-  if (factor_gram(active) != Gram::kSound) return false;
+  if (!are_sound(problem, kkt, active)) return false;
   const typename ContactProblem::Slope slope{{}, -1, {}, seed.controls.data()};
   const Load load{&slope, &softest};
   for (int round = 0; round < kSofteningRounds; ++round) {
@@ -41,10 +38,7 @@ int ActiveSetQp<Model>::exchange_dependent(const ContactProblem& problem, KktSys
                                            ActiveSet& active) {
   const int count = active.count;
   if (count == kMaxActive) return -1;
-  negative_ = kkt.negative;
-  for (int j = 0; j < count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
-  kkt.solve(problem, std::span(loads_).first(count));
-  if (factor_gram(active) != Gram::kSound) return -1;
+  if (!are_sound(problem, kkt, active)) return -1;
   const auto end = active.contact.begin() + count;
   for (const bool comes_after : {true, false})
     for (const int contact : problem.near_contacts()) {

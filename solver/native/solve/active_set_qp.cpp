@@ -68,6 +68,14 @@ bool ActiveSetQp<Model>::is_stable(const ContactProblem& problem, KktSystem& kkt
   negative_ = kkt.negative;
   if (negative_ == 0) return true;
   if (negative_ > active.count) return false;
+  return are_sound(problem, kkt, active);
+}
+
+// Finds the responses to the slopes of active gaps; false where these depend on each other, or leave a direction of
+// negative curvature.
+template <class Model>
+bool ActiveSetQp<Model>::are_sound(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active) {
+  negative_ = kkt.negative;
   for (int j = 0; j < active.count; ++j) loads_[j] = linearize_gap(problem, active.contact[j], j, 0);
   kkt.solve(problem, std::span(loads_).first(active.count));
   return factor_gram(active) == Gram::kSound;

@@ -66,6 +66,7 @@ class ActiveSetQp {
   void add_penalty_response(const ContactProblem& problem, const ActiveSet& active, Direction& step) const;
   void remove_contact(ActiveSet& active, int j, int responses);
   Gram factor_gram(const ActiveSet& active);
+  bool are_sound(const ContactProblem& problem, KktSystem& kkt, const ActiveSet& active);
   void solve_gram(int count, Multipliers& x) const;
   bool drop_negative_multipliers(const ContactProblem& problem, ActiveSet& active, Direction& step);
   bool satisfy_gaps(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step,
