@@ -231,7 +231,8 @@ def _reason(solver, taken, k, repeats=REPEATS):
         return "holes meet"
     if near_zero := _near_zero(state, command):
         return near_zero
-    buckling = 12 * robot.rigidity * (robot.segments / state.length_mm) ** 2
+    softest = min(robot.segment_rigidity or [robot.rigidity]) if robot.model == "rod" else robot.rigidity
+    buckling = 12 * softest * (robot.segments / state.length_mm) ** 2
     if robot.model == "rod" and reason == "work" and state.tensions.sum() > BUCKLED * buckling:
         return "buckled"
     if repeats == 0:
