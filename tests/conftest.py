@@ -11,7 +11,7 @@ settings.load_profile("repeatable")
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--soak", type=int, default=10_000, help="steps of the random soak of the solver")
     parser.addoption(
-        "--vector-steps", type=int, default=1000, help="steps of the vector environments beside single ones"
+        "--vector-steps", type=int, default=400, help="steps of the vector environments beside single ones"
     )
 
 

@@ -14,7 +14,7 @@ from solver.spatial import SpatialRobot
 
 LOADED = ("loaded rod", "loaded space rod")
 STEPS = 60
-EPISODES = 10  # of each model, times --soak over its default
+EPISODES = 4  # of each model, times --soak over its default
 POWERS_OF_TWO = [2.0**k for k in (-10, -3, -1, 1, 3, 10)]
 OTHERS = [0.01, 0.1, 10.0, 1000.0]
 CLOSE = 1e-6  # of the robot's natural units
