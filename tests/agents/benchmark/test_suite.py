@@ -85,13 +85,14 @@ def test_evaluate_writes_table_figures_and_videos(run, tmp_path, monkeypatch, ca
     assert "| PPO |" in (tmp_path / "evaluation.md").read_text()
 
 
-def test_videos_show_the_scene_where_policies_differ_most_of_those_that_can_be_reached():
+def test_videos_show_the_scene_where_policies_differ_most_of_those_where_the_best_reaches_the_set_point():
     def result(errors, reached):
         metrics = {"rmse_mn": np.array([errors]), "success": np.array([reached])}
         return suite.Result(suite.Entry("PI", "CCR/LoadCell-v1", "ideal"), metrics, {})
 
-    results = [result([1.0, 2.0, 9.0], [1, 0, 0]), result([2.0, 5.0, 30.0], [0, 1, 0])]
+    results = [result([1.0, 2.0, 1.0, 40.0], [1, 1, 1, 0]), result([2.0, 5.0, 2.0, 3.0], [0, 0, 0, 1])]
     assert suite.telling_scene(results) == 1
+    assert suite.telling_scene(results[::-1]) == 1
     assert suite.telling_scene([result([1.0, 2.0], [0, 0]), result([9.0, 3.0], [0, 0])]) == 0
 
 
