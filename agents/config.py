@@ -32,6 +32,7 @@ RANGES = {  # of the real-valued settings of learners
 }
 
 POLICIES = ("P", "PI", "MPC", "Harmonic", "Newton", *LEARNERS, "Oracle")
+TUNABLE = tuple(name for name in POLICIES if name != "Oracle")
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 Learner = (
@@ -180,8 +181,8 @@ class EvaluateConfig:
 class SweepConfig:
     """Tune a controller or a learner on training scenes with Optuna."""
 
-    what: Literal["P", "PI", "MPC", "Newton", "PPO", "SAC", "RecurrentPPO", "Distilled"] = "PI"
-    """Controller or learner to tune."""
+    what: Literal["P", "PI", "MPC", "Harmonic", "Newton", "PPO", "RecurrentPPO", "SAC", "Distilled"] = "PI"
+    """Controller or learner to tune: all that `ccr-gym evaluate` plays but the oracle, which has nothing to tune."""
     env_id: str = "CCR/PushObstacle-v1"
     """Environment to tune it on."""
     trials: int = 50
@@ -194,6 +195,7 @@ class SweepConfig:
     """Folder for the study; an existing study is resumed."""
 
     def __post_init__(self) -> None:
+        _check_choice("what", self.what, TUNABLE)
         _check_choice("env_id", self.env_id, tuple(ENV_IDS))
         _check_counts(self, "trials", "episodes", "steps")
 

@@ -14,7 +14,7 @@ import torch
 from agents import cli
 from agents.benchmark import report, suite
 from agents.benchmark.evaluate import METRICS, Episode, measure, run_episode, scores
-from agents.benchmark.suite import Entry, play
+from agents.benchmark.suite import CONTROLLERS, Entry, play
 from agents.benchmark.sweep import sweep
 from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
 from agents.errors import UserError
@@ -183,6 +183,30 @@ def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
     assert "Best of 6" in capsys.readouterr().out
     study = optuna.load_study(study_name=None, storage=f"sqlite:///{tmp_path}/PI-LoadCell-v1.db")
     assert len({tuple(trial.params.values()) for trial in study.trials}) == 6
+
+
+@pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "Oracle"])
+def test_a_sweep_tunes_every_controller(name, tmp_path, monkeypatch):
+    def instead(policy, *_, **__):
+        tried.append(policy)
+        return np.zeros(1)
+
+    tried = []
+    monkeypatch.setattr("agents.benchmark.sweep.scores", instead)
+    arguments = ["sweep", "--what", name, "--env-id", "CCR/LoadCell-v1", "--trials", "2", "--out", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
+    cli.main()
+    shipped = CONTROLLERS[name]("CCR/LoadCell-v1", "realistic")
+    assert [(type(policy), policy.name) for policy in tried] == [(type(shipped), shipped.name)] * 2
+    study = optuna.load_study(study_name=None, storage=f"sqlite:///{tmp_path}/{name}-LoadCell-v1.db")
+    first, second = (trial.params for trial in study.trials)
+    assert first.keys() == second.keys()
+    assert first != second
+
+
+def test_a_sweep_has_no_oracle():
+    with pytest.raises(ValueError, match="what is 'Oracle'; it must be one of P, PI, MPC, Harmonic, Newton"):
+        SweepConfig(what="Oracle")
 
 
 @pytest.mark.parametrize("learner", sorted(LEARNERS))
