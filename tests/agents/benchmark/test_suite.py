@@ -1,5 +1,6 @@
 import itertools
 import json
+import re
 import shutil
 import sys
 import time
@@ -110,8 +111,15 @@ def test_printed_tables_fit_80_columns_and_leave_out_what_is_empty(capsys):
     report.show(by_id)
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
+    notes = [line.partition(":")[0] for line in lines if re.match(r"\w[\w ]*[\w%]:", line)]
+    assert notes == ["force error", "worst tenth", "steady", "within 5 %", "settled", "overshoot", "peak"]
     assert any("RecurrentPPO" in line and "never" in line for line in lines)
     assert "training" not in report.markdown(by_id)
+
+
+def test_every_column_of_a_table_is_explained():
+    assert {name for name in report.HEADINGS if name != "policy"} == report.NOTES.keys()
+    assert report.PRINTED.keys() <= set(report.HEADINGS)
 
 
 def test_every_policy_plays_the_same_scenes():
