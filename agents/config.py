@@ -149,7 +149,7 @@ class EvaluateConfig:
 
     out: Path = Path("runs/evaluation")
     """Folder for the results."""
-    runs: tuple[Path, ...] = ()
+    runs: Annotated[tuple[Path, ...], tyro.conf.arg(help_behavior_hint="(default: none)")] = ()
     """Run folders of trained policies, evaluated on their own environments instead of those in `pretrained`."""
     pretrained: Path = PRETRAINED
     """Folder of trained policies, as `ccr-gym retrain` writes it; by default those in the package."""
@@ -157,8 +157,11 @@ class EvaluateConfig:
     """Environments to evaluate on, unless `runs` are given."""
     policies: tuple[str, ...] = POLICIES
     """Policies to evaluate; the learned ones come from `pretrained`, or from `runs`."""
-    sensing: Literal["ideal", "realistic", "sensorless"] | None = None
-    """Sensing of the environments, for which learned policies must have been trained; by default that of each."""
+    sensing: Annotated[
+        Literal["ideal", "realistic", "sensorless"] | None,
+        tyro.conf.arg(help_behavior_hint="(default: None, that which each environment is tuned with)"),
+    ] = None
+    """Sensing of the environments, for which learned policies must have been trained."""
     episodes: int = 100
     """Episodes per policy and environment; all policies play the same scenes."""
     seed: int = EVALUATION_SEED
@@ -239,8 +242,10 @@ class EstimateConfig:
     """JSON file of the obstacles: a list."""
     out: Path = Path("runs/estimate")
     """Folder for estimate.csv, shape.csv, estimate.json and estimate.png."""
-    sensing: Path | None = None
-    """JSON file of what is known of play, friction and noise; by default the ranges of realistic sensing."""
+    sensing: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: None, the ranges of realistic sensing)")
+    ] = None
+    """JSON file of what is known of play, friction and noise."""
     every: int = 1
     """Rows of the log that are averaged to one."""
 
