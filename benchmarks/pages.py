@@ -85,6 +85,7 @@ BLOCKS: dict[str, tuple[Callable[..., str], tuple[str, ...]]] = {  # what makes 
     "events": (policies.events, ("evaluation",)),
     "headroom": (policies.headroom_table, ("headroom",)),
     "knowledge": (policies.knowledge_table, ("knowledge",)),
+    "probe": (policies.probe_line, ("probe",)),
     "cost of flags": (policies.cost_table, ("cost_of_flags",)),
     "speed in short": (speed.speed_in_short, ("bench", "demo")),
     "kernel": (speed.kernel_table, ("bench",)),
