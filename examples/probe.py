@@ -1,7 +1,7 @@
 """What a reversal buys without a force sensor: it tells the friction of the tendon from the rigidity of the robot.
 
 Pulling alone shows rigidity over what friction leaves of the tension; letting the cable out again shows their product.
-Run ``python examples/probe.py`` after ``pip install '.[agents]'``; it writes probe.png.
+Run ``python examples/probe.py`` after ``pip install '.[agents]'``; it writes runs/probe.png.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Args:
     """Environment."""
     episodes: int = 200
     """Episodes of each kind, in the same scenes."""
-    out: Path = Path("probe.png")
+    out: Path = Path("runs/probe.png")
     """Figure to write."""
 
 
@@ -69,7 +69,9 @@ def main(args: Args) -> dict[str, dict[str, float]]:
     left.set(xlabel="step", ylabel="error of the estimated loss", ylim=(0, None))
     right.set(xlabel="step", ylabel="error of the force / set-point", ylim=(0, 1))
     right.legend()
+    args.out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(args.out, dpi=120)
+    print(f"Written: {args.out}")
     return found
 
 
