@@ -107,9 +107,6 @@ def evaluate(config: EvaluateConfig) -> None:
     if config.video:
         list(followed(suite.film_all(config, results), "film", len(results)))
     report.write(sorted(results, key=lambda result: entries.index(result.entry)), config)
-    print("Force error: root mean square after the search, interquartile mean [95 % interval].")
-    baseline, bound = report.BASELINE, report.BOUND
-    print(f"closed: share of the gap from {baseline} to {bound}; *: interval below that of {baseline}.")
     print(f"Written: {config.out}/evaluation.json, evaluation.md (more columns), figures{' and videos' * config.video}")
 
 

@@ -32,6 +32,7 @@ RANGES = {  # of the real-valued settings of learners
 }
 
 POLICIES = ("P", "PI", "MPC", "Harmonic", "Newton", *LEARNERS, "Oracle")
+TUNABLE = tuple(name for name in POLICIES if name != "Oracle")
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 Learner = (
@@ -148,7 +149,7 @@ class EvaluateConfig:
 
     out: Path = Path("runs/evaluation")
     """Folder for the results."""
-    runs: tuple[Path, ...] = ()
+    runs: Annotated[tuple[Path, ...], tyro.conf.arg(help_behavior_hint="(default: none)")] = ()
     """Run folders of trained policies, evaluated on their own environments instead of those in `pretrained`."""
     pretrained: Path = PRETRAINED
     """Folder of trained policies, as `ccr-gym retrain` writes it; by default those in the package."""
@@ -156,8 +157,11 @@ class EvaluateConfig:
     """Environments to evaluate on, unless `runs` are given."""
     policies: tuple[str, ...] = POLICIES
     """Policies to evaluate; the learned ones come from `pretrained`, or from `runs`."""
-    sensing: Literal["ideal", "realistic", "sensorless"] | None = None
-    """Sensing of the environments, for which learned policies must have been trained; by default that of each."""
+    sensing: Annotated[
+        Literal["ideal", "realistic", "sensorless"] | None,
+        tyro.conf.arg(help_behavior_hint="(default: None, that which each environment is tuned with)"),
+    ] = None
+    """Sensing of the environments, for which learned policies must have been trained."""
     episodes: int = 100
     """Episodes per policy and environment; all policies play the same scenes."""
     seed: int = EVALUATION_SEED
@@ -180,8 +184,8 @@ class EvaluateConfig:
 class SweepConfig:
     """Tune a controller or a learner on training scenes with Optuna."""
 
-    what: Literal["P", "PI", "MPC", "Newton", "PPO", "SAC", "RecurrentPPO", "Distilled"] = "PI"
-    """Controller or learner to tune."""
+    what: Literal["P", "PI", "MPC", "Harmonic", "Newton", "PPO", "RecurrentPPO", "SAC", "Distilled"] = "PI"
+    """Controller or learner to tune: all that `ccr-gym evaluate` plays but the oracle, which has nothing to tune."""
     env_id: str = "CCR/PushObstacle-v1"
     """Environment to tune it on."""
     trials: int = 50
@@ -194,6 +198,7 @@ class SweepConfig:
     """Folder for the study; an existing study is resumed."""
 
     def __post_init__(self) -> None:
+        _check_choice("what", self.what, TUNABLE)
         _check_choice("env_id", self.env_id, tuple(ENV_IDS))
         _check_counts(self, "trials", "episodes", "steps")
 
@@ -237,8 +242,10 @@ class EstimateConfig:
     """JSON file of the obstacles: a list."""
     out: Path = Path("runs/estimate")
     """Folder for estimate.csv, shape.csv, estimate.json and estimate.png."""
-    sensing: Path | None = None
-    """JSON file of what is known of play, friction and noise; by default the ranges of realistic sensing."""
+    sensing: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: None, the ranges of realistic sensing)")
+    ] = None
+    """JSON file of what is known of play, friction and noise."""
     every: int = 1
     """Rows of the log that are averaged to one."""
 

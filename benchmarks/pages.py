@@ -8,6 +8,7 @@ place first: ``python -m benchmarks.pages --evaluation runs/evaluation/evaluatio
 import argparse
 import json
 import re
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,18 @@ def take_evaluation(path: Path) -> None:
     found = json.loads(path.read_text())
     kept = [{key: result[key] for key in ("policy", "env_id", "sensing", "summary")} for result in found["results"]]
     save("evaluation", {**found, "results": [_rounded(result) for result in kept]})
+
+
+def take_bench(path: Path) -> None:
+    """Keep the results of a benchmark.
+
+    Raises:
+        SystemExit: If it was made without MuJoCo, which the docs compare with.
+    """
+    found = json.loads(path.read_text())
+    if not any(name.startswith("mujoco ") for name in found["peers"]):
+        sys.exit(f"{path} has nothing of MuJoCo: pip install mujoco, and measure again")
+    save("bench", _rounded(found))
 
 
 def _rounded(value: Any) -> Any:
@@ -85,6 +98,7 @@ BLOCKS: dict[str, tuple[Callable[..., str], tuple[str, ...]]] = {  # what makes 
     "events": (policies.events, ("evaluation",)),
     "headroom": (policies.headroom_table, ("headroom",)),
     "knowledge": (policies.knowledge_table, ("knowledge",)),
+    "probe": (policies.probe_line, ("probe",)),
     "cost of flags": (policies.cost_table, ("cost_of_flags",)),
     "speed in short": (speed.speed_in_short, ("bench", "demo")),
     "kernel": (speed.kernel_table, ("bench",)),
@@ -106,7 +120,7 @@ def main() -> None:
     if args.evaluation:
         take_evaluation(args.evaluation)
     if args.bench:
-        save("bench", _rounded(json.loads(args.bench.read_text())))
+        take_bench(args.bench)
     write()
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from benchmarks.markdown import digits, listed, table
 
+MODELS = {"rod": "the rod", "paper": "the paper's model"}
 QUANTILES = ("mean", "median", "p95", "p99")
 ENDS = {
     "CONVERGED": "converged",
@@ -18,33 +19,56 @@ Found = Mapping[str, Any]
 
 def kernel_table(bench: Found) -> str:
     """Return the table of the kernel's speed."""
-    plane, space, sqp = bench["kernel"], bench["kernel_in_space"]["paper"], bench["peers"]["sqpmethod"]
+    plane, space, sqp = bench["kernel"], bench["kernel_in_space"], bench["peers"]["sqpmethod"]
     batch = plane["batch_256"]
-    mix = "{:.0%} of {:,} random steps in contact".format
     obstacles = {count: ratio for count, ratio in plane["obstacles_ratio"].items() if count != "2"}
     names = " and ".join(str(int(count) - 1) for count in obstacles)
-    rows = {
-        f"step, 18 segments, 1–3 obstacles, {mix(plane['in_contact'], plane['steps'])}": _times(plane),
-        "of which inside the kernel": f"mean {digits(plane['kernel_mean_us'])} µs",
-        "CasADi/IPOPT on some of these steps in contact, warm started": (
-            f"median {digits(plane['ipopt_median_ms'])} ms, {digits(plane['ipopt_ratio'])} ×"
-        ),
-        "CasADi's SQP method, exact Hessian, on a path in contact": (
+    rows: dict[str, str] = {}
+    for model, name in MODELS.items():
+        if model in plane:
+            rows |= _mix_rows(name, plane[model])
+    rows |= {
+        "the paper's model: CasADi's SQP method, exact Hessian, on a path in contact": (
             f"{digits(sqp['solve_ms'])} ms a solve, {digits(sqp['step_ms'])} ms with its initial guess"
         ),
-        _segments(plane): _growth(plane),
-        f"{names} obstacles out of reach beside one in contact": f"{listed(obstacles, 3)} × the step",
-        "obstacle on a spring; the rod's model": (
-            f"{digits(plane['spring_ratio'], 3)} ×; {digits(plane['rod_ratio'], 3)} × the step"
+        f"the paper's model: {names} obstacles out of reach beside one in contact": (
+            f"{listed(obstacles, 3)} × the step"
         ),
-        "a robot's step in a batch of 256, one thread, two threads": (
+        "the paper's model: obstacle on a spring": f"{digits(plane['spring_ratio'], 3)} × the step",
+        "the paper's model: a robot's step in a batch of 256, one thread, two threads": (
             f"{digits(batch['one_thread_us'])} µs, {digits(batch['two_threads_us'])} µs"
         ),
-        "a step from Python against its replay from `TransitionMemo`": f"{digits(plane['memo_ratio'], 1)} ×",
-        f"in space, 18 segments, 1–3 spheres and cylinders, {mix(space['in_contact'], space['steps'])}": _times(space),
-        f"in space, {_segments(space)}": _growth(space),
+        "the paper's model: a step from Python against its replay from `TransitionMemo`": (
+            f"{digits(plane['memo_ratio'], 1)} ×"
+        ),
+        "the rod beside the paper's model, on a path in contact": f"{digits(plane['rod_ratio'], 3)} × the step",
     }
-    return table(("kernel", "measured"), ((name.replace("%", " %").replace(",0", " 0"), v) for name, v in rows.items()))
+    for model, name in MODELS.items():
+        if model in space:
+            rows |= {
+                f"{name} in space: step, 18 segments, 1–3 spheres and cylinders, {_mix(space[model])}": _times(
+                    space[model]
+                ),
+                f"{name} in space: {_segments(space[model])}": _growth(space[model]),
+            }
+    return table(("kernel", "measured"), rows.items())
+
+
+def _mix_rows(name: str, found: Found) -> dict[str, str]:
+    """Return the rows of a model on the mix of random steps in the plane."""
+    return {
+        f"{name}: step, 18 segments, 1–3 obstacles, {_mix(found)}": _times(found),
+        f"{name}: of which inside the kernel": f"mean {digits(found['kernel_mean_us'])} µs",
+        f"{name}: CasADi/IPOPT, warm started, on some of these steps in contact": (
+            f"median {digits(found['ipopt_median_ms'])} ms, {digits(found['ipopt_ratio'])} × the same steps here"
+        ),
+        f"{name}: {_segments(found)}": _growth(found),
+    }
+
+
+def _mix(found: Found) -> str:
+    steps = f"{found['steps']:,}".replace(",", " ")
+    return f"{found['in_contact']:.0%} of {steps} random steps in contact".replace("%", " %")
 
 
 def _times(found: Found) -> str:
@@ -99,14 +123,16 @@ def instructions_table(counts: Found) -> str:
 
 def statuses_line(bench: Found) -> str:
     """Return how the random steps in the plane ended."""
-    found = bench["kernel"]["statuses"]
-    others = " or ".join(name for status, name in ENDS.items() if not found.get(status))
-    seen = ", ".join(
-        f"{found[status]:,} {name}".replace(",", " ") for status, name in ENDS.items() if found.get(status)
-    )
+    kernel = bench["kernel"]
+    return " ".join(_ends(name, kernel[model]["statuses"]) for model, name in MODELS.items() if model in kernel)
+
+
+def _ends(name: str, found: Found) -> str:
+    others = " or ".join(end for status, end in ENDS.items() if not found.get(status))
+    seen = ", ".join(f"{found[status]:,} {end}".replace(",", " ") for status, end in ENDS.items() if found.get(status))
     total = f"{sum(found.values()):,}".replace(",", " ")
     none = f"; none was {others}" if others else ""
-    return f"Of {total} random steps in the plane with one to three obstacles, {seen}{none}."
+    return f"Of {total} random steps of {name} in the plane with one to three obstacles, {seen}{none}."
 
 
 def mujoco_line(bench: Found) -> str:
@@ -138,12 +164,15 @@ def speed_in_short(bench: Found, demo: Found) -> str:
     """Return the three numbers of the README."""
     kernel, envs = bench["kernel"], bench["environments"]
     many, ratio = envs["vector_steps_per_s"]["256 × 2"], envs["vector_256_ratio"]["2"]
+    measured = {name: kernel[model] for model, name in MODELS.items() if model in kernel}
+    times = " and ".join(f"**{digits(found['mean_us'])} µs** ({name})" for name, found in measured.items())
+    ratios = " and ".join(digits(found["ipopt_ratio"]) for found in measured.values())
     return "\n".join(
         (
-            f"- **{digits(kernel['mean_us'])} µs** a step of the solver with 18 segments among one to three obstacles: "
-            f"{digits(kernel['ipopt_ratio'])} times faster than CasADi with IPOPT on the same steps.",
-            f"- **{digits(many)} steps/s** in a vector of 256 environments on two threads: {digits(ratio)} times as "
-            "many as 256 `Pendulum-v1` in `SyncVectorEnv`.",
+            f"- {times} a step of the solver in the plane: 18 segments among one to three obstacles, mean of random "
+            f"steps. On those in contact CasADi with IPOPT takes {ratios} times as long in the median.",
+            f"- **{digits(many)} steps/s** of `CCR/PushObstacle-v1` (the rod) in a vector of 256 on two threads: "
+            f"{digits(ratio)} times as many as 256 `Pendulum-v1` in `SyncVectorEnv`.",
             f"- **{_duration(demo['seconds'])}** for `make demo` on two cores after installation, "
             f"{digits(demo['steps'])} training steps and the evaluation included.",
         )

@@ -1,13 +1,14 @@
 """Measure what the tables of the docs show, and write these between their marks.
 
 ``python -m benchmarks.tables`` plays every policy with both settings of the sensors, and measures what the estimator
-knows and what wrong contact flags cost. Every result is kept in ``runs/tables``, so that an interrupted run is resumed,
-and several processes share the work; after a change of what is measured, delete that folder. Then it writes
-``docs/results``, the tables between ``<!-- numbers: name -->`` and ``<!-- /numbers -->``, and what ``ccr-gym evaluate``
-writes into ``runs/tables/evaluation``.
+knows, what wrong contact flags cost and what a reversal of the cable tells. Every result is kept in ``runs/tables``,
+so that an interrupted run is resumed, and several processes share the work; after a change of what is measured, delete
+that folder. Then it writes ``docs/results``, the tables between ``<!-- numbers: name -->`` and ``<!-- /numbers -->``,
+and what ``ccr-gym evaluate`` writes into ``runs/tables/evaluation``.
 """
 
 import pickle
+import runpy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -217,6 +218,13 @@ def cost_of_flags(env_id: str, sensing: str) -> Row:
     return {"id": env_id, "sensing": sensing, "fall": float(iqm(fall)), "low": low, "high": high}
 
 
+def probe() -> dict[str, dict[str, float]]:
+    """Return what a reversal of the cable tells, and draw its picture; see ``examples/probe.py``."""
+    example = runpy.run_path(str(ROOT / "examples/probe.py"))
+    found: dict[str, dict[str, float]] = example["main"](example["Args"](out=ROOT / "docs/probe.png"))
+    return {label: {name: round(value, 6) for name, value in errors.items()} for label, errors in found.items()}
+
+
 def write() -> None:
     """Write results, tables and the folder of an evaluation from what is kept."""
     results = [found for path in sorted(KEPT.glob("*-v1-*.pkl")) if isinstance(found := load(path), Result)]
@@ -225,6 +233,7 @@ def write() -> None:
     pages.save("headroom", headroom(results))
     pages.save("knowledge", [row for path in _kept_of("knowledge") for row in load(path) or ()])
     pages.save("cost_of_flags", [row for path in _kept_of("flags") if (row := load(path))])
+    pages.save("probe", probe())
     (KEPT / "evaluation/videos").mkdir(parents=True, exist_ok=True)
     report.write(usual, EvaluateConfig(out=KEPT / "evaluation", episodes=EPISODES))
     pages.take_evaluation(KEPT / "evaluation/evaluation.json")

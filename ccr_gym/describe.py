@@ -102,13 +102,18 @@ def _field_texts(task: AnyTask) -> dict[str, object]:
     return texts
 
 
+class _Pair(tuple[object, ...]):
+    """Texts of two numbers: as a whole that of a range, which is one number where both ends are the same."""
+
+    def __format__(self, _: str) -> str:
+        return "–".join(map(str, dict.fromkeys(self)))
+
+
 def _text(value: object) -> object:
-    """Return a number or a range as text, a tuple of ranges as a list of texts."""
-    if not isinstance(value, tuple):
-        return f"{value:.3g}" if isinstance(value, float) else value
-    if isinstance(value[0], tuple):
-        return [_text(entry) for entry in value]
-    return "–".join(f"{end:.3g}" for end in value)
+    """Return a number as text, a tuple of numbers or ranges as texts."""
+    if isinstance(value, tuple):
+        return _Pair(_text(entry) for entry in value)
+    return f"{value:.3g}" if isinstance(value, float) else value
 
 
 def _table(task: AnyTask, adapter: AnyAdapter, settings: AnySettings) -> str:
@@ -159,4 +164,8 @@ def _meaning(key: str, task: AnyTask, settings: AnySettings) -> tuple[str, str]:
 def _wrapped(text: str) -> str:
     """Return paragraphs at a readable width, tables unchanged."""
     paragraphs = text.split("\n\n")
-    return "\n\n".join(p if p.startswith("|") else textwrap.fill(" ".join(p.split()), WIDTH) for p in paragraphs)
+    return "\n\n".join(p if p.startswith("|") else _filled(p) for p in paragraphs)
+
+
+def _filled(paragraph: str) -> str:
+    return textwrap.fill(" ".join(paragraph.split()), WIDTH, break_on_hyphens=False)

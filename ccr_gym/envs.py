@@ -86,9 +86,10 @@ class TrackForceEnv(TaskEnv):  # noqa: D101 - below
         "Push a circular obstacle with a force that changes and swings.",
         "As `PushObstacle`, but the set-point moves: it swings about a level that changes several times in an "
         "episode. It is previewed, so that an agent that knows its robot can follow without delay.",
-        CIRCLE + ", which is the largest of the episode. Its level changes {changes} times, at uniform times and over "
-        "{ramp} steps each, to {levels} of the largest before scaling; the amplitude of the swing is {swing} of the "
-        "level, its period {period} steps." + FEASIBLE,
+        CIRCLE + ", the largest of the episode. The set-point follows a level that changes {changes} times, at uniform "
+        "times and over {ramp} steps each, to values uniform in {levels}; it swings about the level by {swing} of it, "
+        "in a period of {period} steps. The whole course is scaled so that its largest value is the one sampled."
+        + FEASIBLE,
     )
 
 
@@ -101,8 +102,8 @@ class BracedPushEnv(TaskEnv):  # noqa: D101 - below
         "the upper one beyond, whose contact force is regulated; the force on the lower one changes with it. Some "
         "scenes are near a snap.",
         "The robot is straight, its cable slack. The centre of the lower obstacle is uniform in x {brace[0]} L "
-        "and y {brace[1]} L, its radius in {brace[2]} L; those of the upper one in x {goal[0]} L, y "
-        "{goal[1]} L and {goal[2]} L; the set-point in {force} EI/L²." + FEASIBLE,
+        "and y {brace[1]} L, its radius in {brace[2]} L; that of the upper one in x {goal[0]} L and y "
+        "{goal[1]} L, its radius in {goal[2]} L; the set-point in {force} EI/L²." + FEASIBLE,
     )
 
 
@@ -126,8 +127,10 @@ class MovingObstacleEnv(TaskEnv):  # noqa: D101 - below
         "and back in one direction, and rests between breaths. `info` says how far it has moved (`obstacle_mm`). Where "
         "it presses so hard that the motor cannot hold the cable, the cable pays out; where that does not help, the "
         "obstacle stops.",
-        CIRCLE + ". A breath is {depth} L deep and takes {period} steps; single breaths deviate by up to the fractions "
-        "{variation}. The drift over the episode is {drift} L." + FEASIBLE,
+        CIRCLE + ". In an episode breaths are {depth} L deep and take {period} steps; from one to the next the depth "
+        "varies by up to {variation[0]} of it either way, the period by {variation[1]}. With `drift`, {drift} L by "
+        "default, the obstacle also moves that far over the episode, steadily and in a direction of its own."
+        + FEASIBLE,
     )
 
 

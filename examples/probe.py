@@ -1,7 +1,7 @@
 """What a reversal buys without a force sensor: it tells the friction of the tendon from the rigidity of the robot.
 
 Pulling alone shows rigidity over what friction leaves of the tension; letting the cable out again shows their product.
-Run ``python examples/probe.py`` after ``pip install '.[agents]'``; it writes probe.png.
+Run ``python examples/probe.py`` after ``pip install '.[agents]'``; it writes runs/probe.png.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Args:
     """Environment."""
     episodes: int = 200
     """Episodes of each kind, in the same scenes."""
-    out: Path = Path("probe.png")
+    out: Path = Path("runs/probe.png")
     """Figure to write."""
 
 
@@ -51,8 +51,9 @@ def play(args: Args, *, probing: bool) -> tuple[np.ndarray, np.ndarray]:
     return np.array(losses), np.array(forces)
 
 
-def main(args: Args) -> None:
-    """Draw the medians of both errors over the steps, and print the last ones."""
+def main(args: Args) -> dict[str, dict[str, float]]:
+    """Draw the medians of both errors over the steps; print and return those of the last sixteen."""
+    found = {}
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
     for probing, label in ((False, "no reversal"), (True, "one reversal")):
         losses, forces = play(args, probing=probing)
@@ -60,12 +61,18 @@ def main(args: Args) -> None:
             low, middle, high = np.percentile(errors, [25, 50, 75], axis=1)
             axes.plot(middle, label=label)
             axes.fill_between(range(len(middle)), low, high, alpha=0.2)
-        print(f"{label}: loss ±{np.median(losses[-16:]):.3f}, force ±{100 * np.median(forces[-16:]):.1f} % at the end")
+        early = float(np.median(losses[BACK.start]))
+        loss, force = (float(np.median(errors[-16:])) for errors in (losses, forces))
+        found[label] = {"early_loss": early, "loss": loss, "force": force}
+        print(f"{label}: loss ±{loss:.3f}, force ±{100 * force:.1f} % at the end")
     left.axvspan(BACK.start, BACK.stop, color="0.9", zorder=0)
     left.set(xlabel="step", ylabel="error of the estimated loss", ylim=(0, None))
     right.set(xlabel="step", ylabel="error of the force / set-point", ylim=(0, 1))
     right.legend()
+    args.out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(args.out, dpi=120)
+    print(f"Written: {args.out}")
+    return found
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Render an episode of a trained policy as a GIF; run it after ``pip install '.[agents]'``."""
+"""Render an episode of a trained policy as ``runs/episode.gif``; run it after ``pip install '.[agents]'``."""
 
 import sys
 from pathlib import Path
@@ -22,9 +22,10 @@ def main(path: Path, steps: int = 96) -> None:
     for _ in range(steps):
         observation, *_ = env.step(policy.act(observation))
         pictures.append(env.render())
+    path.parent.mkdir(parents=True, exist_ok=True)
     imageio.imwrite(path, pictures[::2], duration=100, loop=0)  # milliseconds a picture, repeated for ever
     print(f"{path}: {len(pictures[::2])} pictures, {path.stat().st_size / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "episode.gif"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "runs/episode.gif"))

@@ -1,9 +1,10 @@
 """Runs the README on a fresh clone in a fresh virtual environment: every command and block as printed, in order.
 
 ``make readme`` calls it. Each command runs in the same shell state as the one before, so that ``cd``, ``export`` and
-``source`` last; each block of Python in a process of its own. Servers are started, asked for their page, and stopped.
-Commands that take hours are left out unless ``--hours`` is given; ``--fast`` leaves out those that take minutes, too.
-A table says what passed and how long it took, with the pictures and pages it made, to be looked at.
+``source`` last; each block of Python in a process of its own. Servers are started, asked for their page, and stopped;
+what does not end within a generous time has failed. Commands that take hours are left out unless ``--hours`` is given;
+``--fast`` leaves out those that take minutes, too. A table says what passed and how long it took, with the pictures and
+pages it made, to be looked at.
 """
 
 import argparse
@@ -25,8 +26,11 @@ MINUTES = r"make (demo|test|native|docs)|ccr-gym (train|evaluate|reproduce)|exam
 SERVERS = r"tensorboard|ccr-gym play"
 PAGES = {".png", ".gif", ".svg", ".mp4", ".html", ".pdf", ".md", ".csv"}
 IGNORED = {".git", ".venv", "venv", "build", "cache"}
+INHERITED = ("PYTHONPATH", "VIRTUAL_ENV", "MAKE", "MFLAGS")  # of make and of another environment
 STATE = "state.sh"  # tells a folder of this script from others
 START_SECONDS = 120  # within which a server must show its page
+STOP_SECONDS = 20  # within which a process ends that is asked to
+LIMITS = {"seconds": 1800.0, "minutes": 4 * 3600.0, "hours": 72 * 3600.0}  # after which a step has failed [s]
 
 
 @dataclass(frozen=True)
@@ -114,9 +118,16 @@ class Shell:
         """What the present step has printed so far."""
         return self._printed.read_text(errors="replace")
 
-    def run(self, step: Step) -> bool:
-        """Return whether a step succeeded."""
-        return self.start(step).wait() == 0
+    def run(self, step: Step, limit: float | None = None) -> bool:
+        """Return whether a step succeeded, within a number of seconds that is by default that of its kind."""
+        process = self.start(step)
+        try:
+            return process.wait(LIMITS[step.kind] if limit is None else limit) == 0
+        except subprocess.TimeoutExpired:
+            return False
+        finally:
+            if process.poll() is None:
+                stop(process)
 
     def serve(self, step: Step) -> bool:
         """Return whether a server shows a page at the address that it prints; stop it."""
@@ -130,8 +141,20 @@ class Shell:
             return False
         finally:
             if process.poll() is None:
-                os.killpg(process.pid, signal.SIGTERM)
-            process.wait()
+                stop(process)
+
+
+def stop(process: subprocess.Popen[bytes]) -> None:
+    """End a step with all that it started: kindly, and what stays then at once."""
+    for end in (signal.SIGTERM, signal.SIGKILL):
+        try:
+            os.killpg(process.pid, end)
+        except ProcessLookupError:
+            break
+        try:
+            process.wait(STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            continue
 
 
 def answers(address: str) -> bool:
@@ -176,7 +199,7 @@ def prepare(folder: Path, text: str, pinned: bool) -> Shell:
     folder.mkdir(parents=True)
     (folder / STATE).touch()
     subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
-    kept = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(INHERITED)}
     environment = {
         **kept,
         "PATH": f"{folder / 'venv' / 'bin'}{os.pathsep}{os.environ['PATH']}",

@@ -32,6 +32,14 @@ def test_first_example_shows_a_contact_and_a_force(page):
     assert len(code.strip().splitlines()) <= 7
 
 
+def test_every_example_is_listed():
+    examples = DOCS.parent / "examples"
+    files = {path.relative_to(examples).as_posix() for kind in ("py", "yml") for path in examples.rglob(f"*.{kind}")}
+    rows = re.findall(r"^\| `([\w/]+\.\w+)` \|", (DOCS / "tutorials/index.md").read_text(), re.MULTILINE)
+    assert len(rows) == len(set(rows))
+    assert set(rows) == files
+
+
 def test_animation_is_small():
     assert (DOCS / "demo.gif").stat().st_size < 2e6
 

@@ -71,6 +71,19 @@ def test_a_gif_is_written(tmp_path, capsys):
     assert imageio.imread(path).shape == (4, 640, 640, 3)
 
 
+def test_pictures_go_below_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    times = (EXAMPLES / "estimate/truth.csv").read_text().splitlines()[1:]
+    rows = [f"{row.split(',')[0]},0.1,0.01" for row in times]
+    (tmp_path / "estimate.csv").write_text("\n".join(["time_s,force_n,force_std_n", *rows]))
+    check, probe = (runpy.run_path(str(EXAMPLES / f"{name}.py")) for name in ("estimate/check", "probe"))
+    check["main"](check["Args"](results=tmp_path))
+    probe["main"](probe["Args"](episodes=2))
+    printed("render_gif", capsys, Path("runs/episode.gif"), 2)
+    made = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.[pg][ni][gf]"))
+    assert made == ["runs/episode.gif", "runs/estimate/check.png", "runs/probe.png"]
+
+
 def test_stable_baselines_trains_and_is_evaluated(capsys):
     main = runpy.run_path(str(EXAMPLES / "sb3.py"))["main"]
     assert all(0 < error <= 1 for error in main(2048))

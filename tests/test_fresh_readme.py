@@ -1,5 +1,9 @@
 import sys
+import time
+from pathlib import Path
 
+import fresh_readme
+import psutil
 import pytest
 from fresh_readme import Shell, Step, describe, pages_in, run, steps_of
 
@@ -57,6 +61,37 @@ def test_a_server_is_asked_for_its_page_and_stopped(shell):
     server = f"'{sys.executable}' -u -c \"{SERVER}\""
     assert shell.serve(Step("console", server))
     assert not shell.serve(Step("console", "echo no address"))
+
+
+def test_a_command_that_does_not_end_fails_with_all_that_it_started(shell, tmp_path, monkeypatch):
+    monkeypatch.setattr(fresh_readme, "STOP_SECONDS", 0.5)
+    stubborn = "trap '' TERM; sleep 600 & echo $! > child; wait; sleep 600"
+    assert not shell.run(Step("console", stubborn), 1.0)
+    child = int((tmp_path / "child").read_text())
+    deadline = time.monotonic() + 10
+    while running(child) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not running(child)
+    assert shell.run(Step("console", "true"))
+
+
+def running(process):
+    """Return whether a process has not ended, whether or not anybody has taken note of its end."""
+    try:
+        return psutil.Process(process).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+def test_every_kind_but_servers_has_a_limit():
+    kinds = {step.kind for step in steps_of((Path(__file__).parents[1] / "README.md").read_text())}
+    assert kinds - {"server"} <= fresh_readme.LIMITS.keys()
+
+
+def test_the_readme_installs_before_it_imports():
+    steps = list(steps_of((Path(__file__).parents[1] / "README.md").read_text()))
+    blocks = [k for k, step in enumerate(steps) if step.language == "python"]
+    assert any(step.code.startswith("pip install .") for step in steps[: blocks[0]])
 
 
 SERVER = (

@@ -1,6 +1,7 @@
 """The command that writes the numbers of README and docs."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))  # last, so that an installed package goes first
 
-from benchmarks import markdown, pages
+from benchmarks import markdown, pages, speed_text
 
 
 @pytest.mark.parametrize("page", pages.PAGES, ids=lambda page: page.name)
@@ -29,6 +30,29 @@ def test_blocks_are_written_between_their_marks_and_nowhere_else():
     assert pages.fill(filled, {"x": "1", "y": "2\n3"}) == filled
     with pytest.raises(ValueError, match="'y' names no block"):
         pages.fill(text, {"x": ""})
+
+
+def test_a_benchmark_without_what_the_docs_compare_with_is_not_taken(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "RESULTS", tmp_path)
+    path = tmp_path / "new.json"
+    path.write_text(json.dumps({"kernel": {}, "peers": {"sqpmethod": {}}}))
+    with pytest.raises(SystemExit, match="pip install mujoco"):
+        pages.take_bench(path)
+    assert not (tmp_path / "bench.json").exists()
+
+
+def test_each_time_is_named_after_its_model():
+    bench, demo = pages.load("bench"), pages.load("demo")
+    paper = bench["kernel"]["paper"]
+    both = {**bench, "kernel": {**bench["kernel"], "rod": {**paper, "mean_us": 7.5, "ipopt_ratio": 432}}}
+    short = speed_text.speed_in_short(both, demo).splitlines()[0]
+    assert "**7.5 µs** (the rod) and **" in short
+    assert "µs** (the paper's model) a step" in short
+    assert f" takes 432 and {markdown.digits(paper['ipopt_ratio'])} times as long" in short
+    assert len(speed_text.statuses_line(both).split(" random steps of ")) == 3
+    for row in speed_text.kernel_table(both).splitlines()[2:]:
+        assert re.match(r"\| (the rod|the paper's model)\b", row)
+    assert "| the rod: step, 18 segments" in speed_text.kernel_table(both)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -57,6 +58,14 @@ def test_command_is_there(command):
 def test_links_lead_to_files(page):
     for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
         assert (page.parent / target).exists(), target
+
+
+def test_an_address_of_the_project_is_the_same_everywhere_and_none_is_a_placeholder():
+    project, citation = (ROOT / "pyproject.toml").read_text(), (ROOT / "CITATION.cff").read_text()
+    for text in (*PAGES, project, citation):
+        assert not re.search(r"https?://[A-Z<{$]", text)
+    given = tomllib.loads(project)["project"].get("urls", {}).get("Repository")
+    assert yaml.safe_load(citation).get("repository-code") == given
 
 
 def test_there_are_blocks_and_commands():

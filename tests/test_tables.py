@@ -28,6 +28,17 @@ def test_the_table_of_headroom():
     assert text == ("| `LoadCell` | realistic | 119 |  |  | 10.0 [9.0, 12.0] |  |  | 0.0 [0.0, 0.1] | 8.4 % | yes |")
 
 
+def test_the_docs_show_what_the_probe_tells(tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "ROOT", tmp_path)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "examples").symlink_to(pages.ROOT / "examples")
+    measured, shown = tables.probe(), pages.load("probe")
+    assert measured.keys() == shown.keys()
+    for label, errors in measured.items():
+        assert errors == pytest.approx(shown[label], rel=0.05)
+    assert (tmp_path / "docs/probe.png").stat().st_size > 10_000
+
+
 def test_what_is_kept_is_measured_once(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "KEPT", tmp_path)
     calls = []

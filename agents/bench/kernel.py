@@ -28,6 +28,12 @@ from solver import (
     clearance,
 )
 
+Model = Literal["rod", "paper"]
+MODELS: tuple[Model, ...] = ("rod", "paper")
+SEGMENTS = {
+    "rod": (18, 36, 72, 144, 288),
+    "paper": (9, 18, 36, 72, 144, 288),
+}  # a rod of 9 could let the circle through
 STEPS_PER_SCENE = 100
 LARGEST_CABLE = 14.0  # [mm]
 DRIFT = 0.14  # mean cable increment; positive pulls [mm]
@@ -82,7 +88,7 @@ def timed_step(solver: Solver, start: Equilibrium, command: float) -> PlanarStep
     )
 
 
-def contact_mix(steps: int, seed: int = 0, robot: Robot = Robot.prototype()) -> Iterator[PlanarStep]:  # noqa: B008 - frozen
+def contact_mix(steps: int, robot: Robot, seed: int = 0) -> Iterator[PlanarStep]:
     """Yield steps of random increments of ±0.5 mm with a drift towards pulling, 100 steps per scene."""
     generator = np.random.default_rng(seed)
     for _ in range(steps // STEPS_PER_SCENE):
@@ -119,9 +125,9 @@ SPRUNG = Circle(center=(44, 104), radius=15, spring=1.0)
 PATH = np.concatenate([np.arange(0.25, 8.01, 0.25), np.arange(7.75, -0.01, -0.25)])
 
 
-def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
+def growth(model: Model, repeats: int = 20) -> dict[int, float]:
     """Return the mean over a path of each step's median duration, by number of segments [µs]."""
-    solvers = {n: Solver(Robot.prototype(model="paper", segments=n), Scene([PUSHED])) for n in counts}
+    solvers = {n: Solver(Robot.prototype(model=model, segments=n), Scene([PUSHED])) for n in SEGMENTS[model]}
     return {
         n: float(np.median([path_times(solver) for _ in range(repeats)], axis=0).mean())
         for n, solver in solvers.items()
@@ -131,7 +137,7 @@ def growth(counts: tuple[int, ...], repeats: int = 20) -> dict[int, float]:
 FAR = [Circle(center=(60 + 12 * k, -30 - 5 * k), radius=6) for k in range(31)]
 
 
-def cost(obstacles: list[Circle], model: Literal["paper", "rod"] = "paper", repeats: int = 40) -> float:
+def cost(obstacles: list[Circle], model: Model = "paper", repeats: int = 40) -> float:
     """Return the duration of a path relative to that of the paper's model with one obstacle; medians of paired runs."""
     reference = Solver(Robot.prototype(model="paper"), Scene([PUSHED]))
     other = Solver(replace(Robot.prototype(model="paper"), model=model), Scene(obstacles))
@@ -199,33 +205,40 @@ def batch_times(count: int, steps: int = 200) -> tuple[float, float, float]:
     return alone - call_overhead(), one, two
 
 
-def measure(steps: int, rivals: int) -> JsonObject:
-    """Return all measurements by name."""
+def mixed(model: Model, steps: int, rivals: int) -> JsonObject:
+    """Return the measurements of a model on the contact mix, and its growth with the number of segments."""
     times, statuses, touching = np.empty(steps), Counter[str](), 0
     sample: list[PlanarStep] = []
-    for i, step in enumerate(contact_mix(steps)):
+    for i, step in enumerate(contact_mix(steps, Robot.prototype(model=model))):
         times[i] = step.microseconds
         statuses[step.end.status.name] += 1
         in_touch = bool(step.end.contact.any())
         touching += in_touch
         if in_touch and step.end.status is Status.CONVERGED and i * rivals // steps >= len(sample):
             sample.append(step)
-    overhead = call_overhead()
     kernel, reference = reference_times(sample)
-    means = growth((9, 18, 36, 72, 144, 288))
-    alone, one, two = batch_times(256)
+    means = growth(model)
     return {
         "steps": steps,
         "in_contact": touching / steps,
         "statuses": dict(statuses),
         "mean_us": float(times.mean()),
         **{f"{name}_us": float(np.percentile(times, q)) for name, q in (("median", 50), ("p95", 95), ("p99", 99))},
-        "call_overhead_us": overhead,
-        "kernel_mean_us": float(times.mean()) - overhead,
+        "kernel_mean_us": float(times.mean()) - call_overhead(),
         "ipopt_median_ms": float(np.median(reference)) / 1e3,
+        "ipopt_beside_us": float(np.median(kernel)),
         "ipopt_ratio": float(np.median(reference / kernel)),
         "segments_mean_us": {str(n): mean for n, mean in means.items()},
         "growth_exponent": float(np.polyfit(np.log(list(means)), np.log(list(means.values())), 1)[0]),
+    }
+
+
+def measure(steps: int, rivals: int) -> JsonObject:
+    """Return all measurements by name: of both models on the contact mix, and ratios of the paper's model."""
+    alone, one, two = batch_times(256)
+    return {
+        **{model: mixed(model, steps, rivals) for model in MODELS},
+        "call_overhead_us": call_overhead(),
         "rod_ratio": cost([PUSHED], model="rod"),
         "obstacles_ratio": {str(n): cost([PUSHED, *FAR[: n - 1]]) for n in (2, 11, 32)},
         "spring_ratio": cost([SPRUNG]),

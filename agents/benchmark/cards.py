@@ -3,6 +3,7 @@
 import textwrap
 from dataclasses import asdict
 
+from agents.benchmark.evaluate import SEARCH
 from agents.benchmark.suite import Result
 from agents.config import EvaluateConfig
 from ccr_gym import Sensing
@@ -59,7 +60,7 @@ def _result(result: Result, rivals: list[Result], config: EvaluateConfig) -> str
     low, high = summary["rmse_interval_mn"]
     others = "; ".join(f"{r.entry.policy} {r.summary['rmse_iqm_mn']:.2f}" for r in rivals if r is not result)
     return f"""**Result**: force error {summary["rmse_iqm_mn"]:.2f} mN [{low:.2f}, {high:.2f}]: interquartile mean, with
-        its 95 % interval, of the root mean square after the search, over {config.episodes} test scenes, seeds from
-        {config.seed}; for this file alone {summary["rmse_of_seeds_mn"][0]:.2f} mN. Worst tenth
+        its 95 % interval, of the root mean square after the first {SEARCH} steps, over {config.episodes} test scenes,
+        seeds from {config.seed}; for this file alone {summary["rmse_of_seeds_mn"][0]:.2f} mN. Worst tenth
         {summary["rmse_cvar_mn"]:.1f} mN; {summary["success"]:.0%} end within 5 % of the set-point;
         {summary["violations"]:.2f} steps per episode above the force limit. For comparison: {others}."""

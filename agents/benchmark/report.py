@@ -1,6 +1,7 @@
 """Results of the benchmark as JSON, tables, figures and model cards."""
 
 import json
+import textwrap
 from collections.abc import Callable
 
 import gymnasium
@@ -11,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from agents.benchmark.cards import card
+from agents.benchmark.evaluate import SEARCH, STEADY
 from agents.benchmark.figures import draw_curves, draw_episodes, draw_profiles, draw_scores
 from agents.benchmark.suite import Result
 from agents.config import POLICIES, EvaluateConfig
@@ -50,6 +52,24 @@ PRINTED = {  # columns of the printed table, and their headings there
     "overshoot": "over-\nshoot",
     "peak [mN]": "peak\n[mN]",
 }
+NOTES = {  # what is below a heading
+    "closed": f"share of the way from the force error of {BASELINE} to that of {BOUND}; *: interval below {BASELINE}'s",
+    "force error [mN]": f"root mean square of force minus set-point after the first {SEARCH} steps, in which the robot "
+    "looks for contact; interquartile mean over all episodes [95 % interval]",
+    "first seed [mN]": "the same of the first training seed alone",
+    "worst tenth [mN]": "mean of that root mean square over the worst tenth of the episodes",
+    "steady [mN]": f"mean error of the last {STEADY} steps",
+    "within 5 %": "share of the episodes that end within 5 % of the set-point",
+    "settled [step]": "step from which on the error stays within 5 %, median of the episodes",
+    "overshoot": "how far the largest force is above the set-point, median of the episodes",
+    "contact lost [times]": "how often an episode loses contact",
+    "peak [mN]": "largest force, mean of the episodes",
+    "over limit [steps]": "steps of an episode with a force above `force_limit`",
+    "by estimate [mN]": "force error if the virtual-work estimate were the force, mean of the episodes",
+    "events": "share of the steps in which the robot snaps, stalls or is blocked",
+    "decisions/s": "decisions in a second of CPU time",
+    "training": "duration of the training run",
+}
 Grouped = dict[str, list[Result]]  # results by environment
 
 
@@ -61,7 +81,8 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
     first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
     write_text(config.out / "scores.json", json.dumps(first) + "\n")
     by_id = group(results)
-    write_text(config.out / "evaluation.md", f"{matrix(by_id)}\n{markdown(by_id)}")
+    notes = "\n".join(f"- {note}" for note in notes_on(by_id))
+    write_text(config.out / "evaluation.md", f"{matrix(by_id)}\n{markdown(by_id)}\n{notes}\n")
     _write_cards(by_id, config)
     _draw(by_id, config)
     show(by_id)
@@ -131,6 +152,12 @@ def filled(here: list[Result]) -> list[dict[str, str]]:
     return [{heading: row[heading] for heading in kept} for row in rows]
 
 
+def notes_on(by_id: Grouped, printed: bool = False) -> list[str]:
+    """Return what the columns of the tables mean, of those that at least one table has."""
+    shown = {name for here in by_id.values() for name in filled(here)[0] if not printed or name in PRINTED}
+    return [f"{name.partition(' [')[0]}: {note}" for name, note in NOTES.items() if name in shown]
+
+
 def markdown(by_id: Grouped) -> str:
     """Return a table for every environment, in Markdown."""
     lines: list[str] = []
@@ -167,7 +194,7 @@ def _cell(result: Result | None, rivals: list[Result]) -> str:
 
 
 def show(by_id: Grouped) -> None:
-    """Print the tables, with the columns that 80 characters have room for."""
+    """Print the tables, with the columns that 80 characters have room for, and what these mean."""
     console = Console(width=max(WIDTH, Console().width))
     for env_id, here in by_id.items():
         rows = [{name: text for name, text in row.items() if name in PRINTED} for row in filled(here)]
@@ -177,6 +204,9 @@ def show(by_id: Grouped) -> None:
         for row in rows:
             table.add_row(*map(Text, row.values()))
         console.print(table)
+    print()
+    for note in notes_on(by_id, printed=True):
+        print(textwrap.fill(note, WIDTH, subsequent_indent="  "))
 
 
 def _curves(results: list[Result]) -> dict[str, list[LearningCurve]]:

@@ -235,9 +235,13 @@ def film(entry: Entry, seed: int, path: Path) -> Path:
 
 
 def telling_scene(results: Sequence[Result]) -> int:
-    """Return the scene in which policies differ most, of those where one of them ends at the set-point, if any."""
+    """Return the scene in which policies differ most, of those where the best of them ends at the set-point, if any.
+
+    Where it does not, its own failure may be the difference, and nobody sees what the set-point asks.
+    """
     errors = np.array([result.rmse[0] for result in results])
-    reached = np.array([result.metrics["success"][0] for result in results]).max(axis=0) > 0
+    best = min(results, key=lambda result: float(iqm(result.rmse.ravel())))
+    reached = best.metrics["success"][0] > 0
     spread = errors.max(axis=0) - errors.min(axis=0)
     return int(np.argmax(np.where(reached, spread, -1.0) if reached.any() else spread))
 

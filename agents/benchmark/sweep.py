@@ -9,6 +9,7 @@ from agents.benchmark.evaluate import scores
 from agents.benchmark.statistics import iqm
 from agents.config import VALIDATION_SEED, SweepConfig, TrainConfig
 from agents.controllers.force import ForceController
+from agents.controllers.harmonic import HarmonicController
 from agents.controllers.mpc import PredictiveController
 from agents.controllers.newton import NewtonController
 from agents.errors import UserError
@@ -26,6 +27,8 @@ from agents.tuned import (
     SACSettings,
     sensing_of,
 )
+
+PREDICTIVE = {"MPC": PredictiveController, "Harmonic": HarmonicController}
 
 
 def sweep(config: SweepConfig) -> optuna.Study:
@@ -57,12 +60,12 @@ def _score(trial: optuna.Trial, config: SweepConfig) -> float:
 def _policy(trial: optuna.Trial, config: SweepConfig) -> Policy:
     if config.what in LEARNERS:
         return _learned(trial, config)
-    if config.what == "MPC":
-        return PredictiveController(_mpc(trial))
+    if config.what in PREDICTIVE:
+        return PREDICTIVE[config.what](_mpc(trial))
     if config.what == "Newton":
         return NewtonController(gain=trial.suggest_float("gain", 0.2, 1.0))
     proportional = trial.suggest_float("proportional", 0.0, 4.0) if config.what == "PI" else 0.0
-    return ForceController(proportional, trial.suggest_float("integral", 0.05, 4.0, log=True))
+    return ForceController(proportional, trial.suggest_float("integral", 0.05, 4.0, log=True), name=config.what)
 
 
 def _mpc(trial: optuna.Trial) -> MPCSettings:

@@ -183,8 +183,10 @@ def page(readings: Mapping[str, Mapping[str, Reading]]) -> str:
         "# Two models, six scenes",
         "",
         'The same robot, obstacles and cable displacements, in `model="paper"` and in `model="rod"`: the prototype '
-        f"(180 mm, 18 segments, EI 5000 N·mm²), pulled from rest in steps of {STEP_MM} mm. Red arrows are contact "
-        "forces on the robot, to one scale in each picture, with their numbers in newton; grey bars are disks. "
+        f"(180 mm, 18 segments, EI 5000 N·mm²), pulled from rest in steps of {STEP_MM} mm. Red arrows are "
+        "the forces of the robot on the obstacles, with their numbers in newton. They are to scale, one scale for both "
+        "robots of a picture and another in the next, so that the paper's are hardly longer than the dot at the "
+        "contact; grey bars are disks. "
         "[model.md](model.md) says what the models are; `ccr-gym reproduce` draws the pictures and writes this page.",
         "",
         "Look at two things. Where the robot touches, the paper's model has a kink with disks askew, which no robot "

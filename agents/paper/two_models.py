@@ -20,8 +20,9 @@ from solver import Equilibrium, HalfPlane
 from solver.spatial import SpatialEquilibrium
 
 FORCE, DISK = "#c81e3a", "#8a93a6"
-LONGEST_MM, SHORTEST_MM = 42.0, 7.0  # arrows of the largest force of a picture, and of one that would not be seen
-LABEL_X_MM, LABEL_MM = -58.0, 12.0  # where forces are written: from x on in the plane, beyond the arrow in space
+LONGEST_MM = 42.0  # arrow of the largest force of a picture
+POINTS_PER_MM, HEAD = 1.5, 12.0  # size of a picture in the plane, and of the head of an arrow that is long enough [pt]
+LABEL_X_MM, LABEL_MM = -58.0, 25.0  # where forces are written: from x on in the plane, before the arrow in space
 ZOOM_MM = 21.0  # half of the window around a contact
 COLORS = 96  # of the palette, which makes files a third as large
 
@@ -49,6 +50,7 @@ def draw_case(path: Path, case: Case, both: dict[str, AnyEquilibrium]) -> None:
             _draw_in_space(axis, state, LONGEST_MM / strongest)
         else:
             _draw_in_plane(axis, state, LONGEST_MM / strongest, zoomed)
+    figure.supxlabel(f"arrows: force on the obstacle, 10 mm long for {10 * strongest / LONGEST_MM:.2g} N", fontsize=10)
     _save(figure, path)
 
 
@@ -68,7 +70,7 @@ class Arrow(NamedTuple):
     Attributes:
         obstacle: Index of the obstacle.
         place: Point that touches, of several their mean by multipliers [mm].
-        vector: The arrow from there [mm].
+        vector: The arrow from there, along the force on the obstacle [mm].
         force: The force [N].
     """
 
@@ -78,22 +80,22 @@ class Arrow(NamedTuple):
     force: float
 
 
-def _arrows(state: AnyEquilibrium, scale: float) -> list[Arrow]:
-    """Return the arrows of all obstacles that push, to a scale in mm/N."""
-    arrows = []
+def arrows(state: AnyEquilibrium, scale: float) -> list[Arrow]:
+    """Return the forces on all obstacles that are pushed, as arrows to a scale in mm/N."""
+    shown = []
     for obstacle, (multipliers, force) in enumerate(zip(state.multipliers, state.forces, strict=True)):
         size = float(np.linalg.norm(force))
         if size > 0:
             place = np.tensordot(multipliers / multipliers.sum(), state.points, axes=2)
-            arrows.append(Arrow(obstacle, place, force / size * max(scale * size, SHORTEST_MM), size))
-    return arrows
+            shown.append(Arrow(obstacle, place, -scale * force, size))
+    return shown
 
 
 def _draw_in_plane(axis: Axes, state: Equilibrium, scale: float, zoomed: int) -> None:
     axis.set(aspect="equal", xlim=(-62, 118), ylim=(-8, 184), xlabel="x [mm]", ylabel="y [mm]")
     axis.grid(alpha=0.2)
     _draw_bodies(axis, state)
-    for arrow in _arrows(state, scale):
+    for arrow in arrows(state, scale):
         _draw_arrow(axis, arrow)
         if arrow.obstacle == zoomed:
             _draw_zoom(axis, state, arrow.place)
@@ -128,7 +130,8 @@ def _draw_bodies(axis: Axes, state: Equilibrium, wide: float = 1.0) -> None:
 def _draw_arrow(axis: Axes, arrow: Arrow) -> None:
     """Draw a force, and write it at the left edge, with a line to the arrow."""
     end = arrow.place + arrow.vector
-    style = {"arrowstyle": "-|>", "color": FORCE, "lw": 1.8, "mutation_scale": 12, "shrinkA": 0, "shrinkB": 0}
+    head = min(HEAD, POINTS_PER_MM * float(np.linalg.norm(arrow.vector)) / 0.6)
+    style = {"arrowstyle": "-|>", "color": FORCE, "lw": 1.8, "mutation_scale": head, "shrinkA": 0, "shrinkB": 0}
     axis.annotate("", tuple(end), tuple(arrow.place), arrowprops=style, zorder=5)
     x, y = min(end.tolist(), arrow.place.tolist())
     line = {"arrowstyle": "-", "color": FORCE, "lw": 0.7, "ls": ":"}
@@ -141,10 +144,10 @@ def _draw_arrow(axis: Axes, arrow: Arrow) -> None:
 def _draw_in_space(axis: Axes3D, state: SpatialEquilibrium, scale: float) -> None:
     axis.computed_zorder = False  # the robot is in front of the obstacles
     draw_shape_in_space(axis, state)
-    for arrow in _arrows(state, scale):
+    for arrow in arrows(state, scale):
         axis.quiver(*arrow.place, *arrow.vector, color=FORCE, lw=2.0, arrow_length_ratio=0.25, zorder=5)
         along = arrow.vector / np.linalg.norm(arrow.vector)
-        label = arrow.place + (np.linalg.norm(arrow.vector) + LABEL_MM) * along
+        label = arrow.place - LABEL_MM * along
         axis.text(*label, f"{arrow.force:.2g} N", color=FORCE, ha="right", fontsize=9.5, weight="bold", zorder=6)
     axis.set(xlim=(-30, 110), ylim=(-70, 70), zlim=(0, 180), xticks=(0, 50, 100), yticks=(-50, 0, 50))
     axis.set_box_aspect((140, 140, 180), zoom=1.05)

@@ -12,6 +12,7 @@ from agents.play.inputs import Inputs, Key, set_value
 from agents.play.session import Session
 
 KEYS: tuple[tuple[Key, Key], ...] = (("K", "J"), ("L", "H"), ("O", "U"), ("P", "Y"))  # pull and pay out a coordinate
+ARROWS = "Arrows: the force of the robot on the obstacle, **green** the true one, **orange** its estimate."
 RECORD, STOP_RECORDING = "Record a GIF", "Stop recording"
 MILLI = 1e3
 
@@ -38,7 +39,9 @@ class Controls:
         self._buttons = gui.add_button_group("Scene", ("New", "Straighten", "Pause"))
         self._episodes = gui.add_checkbox("New scene after each episode", session.episodes)
         self._gif = gui.add_button("")
-        self._hints = gui.add_markdown("Drag obstacles by their handles. Keys: " + "; ".join(self._key_hints()))
+        self._hints = gui.add_markdown(
+            f"{ARROWS} Drag obstacles by their handles. Keys: {'; '.join(self._key_hints())}"
+        )
         self.show_recording(recording)
         inputs.on_value(self._driver, lambda value: session.choose("driver", value))
         inputs.on_choice(self._buttons, self._press)

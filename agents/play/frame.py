@@ -35,7 +35,8 @@ class Contacts:
         points: The points, ``(k, 3)`` [L].
         levels: Their multipliers as forces, over the force that fills the scale, ``(k,)``.
         touched: Indices of the obstacles that are touched.
-        arrow_true: Tail and head of the true force on the robot, ``(2, 3)`` [L]; both the same without contact.
+        arrow_true: Tail and head of the true force on the obstacles, ``(2, 3)`` [L]; both the same
+            without contact.
         arrow_est: The same of the estimate.
     """
 

@@ -20,6 +20,7 @@ from ccr_gym import ENV_IDS
 from solver import PRESETS
 
 SLOW = 8  # ticks between updates of numbers, charts and sliders, each of which costs a browser more than the scene
+TITLE = "ccr-gym play"
 NUDGE = 4.0  # full actions of a key
 CHOICES = {
     "env_id": ("Task", tuple(ENV_IDS)),
@@ -50,6 +51,7 @@ class Page:
         frame = session.tick()
         with self._drive:
             self._status = server.gui.add_html(self._status_html(frame))
+            server.gui.add_html(f"<style onload=\"document.title = '{TITLE}'\"></style>")
         self._world, self._controls, self._plots = self._new_world(frame), self._new_controls(), self._new_plots(frame)
 
     def tick(self) -> None:
@@ -160,7 +162,7 @@ class Page:
 
 def _configure(server: viser.ViserServer) -> None:
     server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(33, 60, 114))
-    server.gui.set_panel_label("ccr-gym play")
+    server.gui.set_panel_label(TITLE)
     server.gui.main_panel.dock_right()
     server.scene.set_up_direction("+z")
     server.scene.configure_default_lights(cast_shadow=False)

@@ -253,7 +253,7 @@ class Session:
         equilibrium, info, scales = self.equilibrium, self._info, self.env.settings.scales
         if self._ticks % RESIDUAL_EVERY == 0:
             self._certify()
-        contacts = contacts_of(equilibrium, info["force_true"], info["force_est"], scales)
+        contacts = contacts_of(equilibrium, info["force_true"], info["force_est"], self.env.task.target, scales)
         now, resting = equilibrium.scene_now.obstacles, equilibrium.scene.obstacles
         return Frame(shape_of(equilibrium, scales), now, resting, contacts, self._numbers(equilibrium))
 

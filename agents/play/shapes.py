@@ -45,25 +45,45 @@ def shape_of(equilibrium: AnyEquilibrium, scales: Scales) -> Shape:
     return Shape(nodes, _quaternions(equilibrium), np.concatenate(pieces), np.array(carries))
 
 
-def contacts_of(equilibrium: AnyEquilibrium, true: np.ndarray, estimate: np.ndarray, scales: Scales) -> Contacts:
-    """Return the contacts, with arrows of the true and the estimated force on the robot ``(d,)`` [N]."""
+def contacts_of(
+    equilibrium: AnyEquilibrium, true: np.ndarray, estimate: np.ndarray, target: int | None, scales: Scales
+) -> Contacts:
+    """Return the contacts, with arrows of what the robot exerts on the obstacles.
+
+    Args:
+        equilibrium: The robot among its obstacles.
+        true: True force on the robot, ``(d,)`` [N].
+        estimate: Its estimate.
+        target: Index of the obstacle that both forces are of; ``None`` for the sum over all.
+        scales: Scales of the page.
+    """
     multipliers = equilibrium.multipliers
     sizes = multipliers.sum(axis=0)
     points = to_page(equilibrium.points, scales.length_mm)[sizes > 0]
     weights = sizes[sizes > 0]
     levels = equilibrium.energy_scale * weights / (SHOWN_FORCE * scales.force_n)
     touched = frozenset(np.flatnonzero((multipliers > 0).any(axis=(1, 2))).tolist())
-    middle = np.average(points, axis=0, weights=weights) if len(points) else np.zeros(3)
-    arrows = (_arrow(middle, force, side * ASIDE, scales) for force, side in ((true, -1), (estimate, 1)))
+    tail = _tail(equilibrium, target, scales)
+    arrows = (_arrow(tail, -force, side * ASIDE, scales) for force, side in ((true, -1), (estimate, 1)))
     return Contacts(points, levels, touched, *arrows)
 
 
-def _arrow(tail: np.ndarray, force: np.ndarray, aside: float, scales: Scales) -> np.ndarray:
+def _tail(equilibrium: AnyEquilibrium, target: int | None, scales: Scales) -> np.ndarray | None:
+    """Return where the arrows of forces start, the mean contact point of one or all obstacles, ``(3,)`` [L]."""
+    chosen = slice(None) if target is None else slice(target, target + 1)
+    weights = equilibrium.multipliers[chosen].sum(axis=0)
+    if not weights.any():
+        return None
+    points = to_page(equilibrium.points, scales.length_mm)
+    return np.asarray(np.tensordot(weights / weights.sum(), points, axes=weights.ndim))
+
+
+def _arrow(tail: np.ndarray | None, force: np.ndarray, aside: float, scales: Scales) -> np.ndarray:
     """Return tail and head of the arrow of a force, ``(2, 3)``, moved to its side and in the plane before the robot."""
     vector = ARROW / (SHOWN_FORCE * scales.force_n) * to_page(force, 1.0)
     size = float(np.linalg.norm(vector))
-    if size == 0:
-        return np.stack([tail, tail])
+    if size == 0 or tail is None:
+        return np.zeros((2, 3))
     vector *= min(1.0, LONGEST_ARROW / size)
     side = np.array([vector[2], 0.0, -vector[0]]) / max(float(np.hypot(vector[0], vector[2])), 1e-9 * size)
     start = tail + aside * side

@@ -28,6 +28,7 @@ MARKERS = 16  # contact points that are shown at most
 MARKER, THICK, THIN = 0.016, 0.016, 0.006  # radius of a marker, thickness of backbone and cables [L]
 BEFORE = -0.075  # where contacts and arrows of the plane are shown, before obstacles [L]
 FLAT = 0.18  # of the disks of a planar robot across the plane, over their radius
+SEEN_THROUGH = 0.5  # opacity in space of an obstacle that is touched: the arrows of forces point into it
 CAMERA_FOV = 0.6  # [rad]
 
 
@@ -172,6 +173,7 @@ class World:
         if touched != self._tints[index]:
             self._tints[index] = touched
             mesh.color = TOUCHED if touched else OBSTACLE
+            mesh.opacity = SEEN_THROUGH if touched and not self._planar else None
 
     @staticmethod
     def _put(handle: viser.SceneNodeHandle, middle: np.ndarray) -> None:

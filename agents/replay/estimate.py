@@ -50,6 +50,11 @@ class Estimates:
         return np.array([getattr(known, name) for known in self.known])
 
     @property
+    def latency_rows(self) -> int:
+        """Rows by which the positions come late, as found in the end; the estimate is a mean of whole numbers."""
+        return round(float(self.known[-1].latency))
+
+    @property
     def position_errors_mm(self) -> np.ndarray:
         """Root mean square distance of the measured positions from the shapes, ``(K,)``; NaN without any [mm].
 
@@ -58,7 +63,7 @@ class Estimates:
         if not self.log.nodes.size:
             return np.full(len(self.shapes), np.nan)
         found = np.array([positions(shape, self.log.nodes) for shape in self.shapes])
-        late = np.maximum(np.arange(len(found)) - round(float(self.known[-1].latency)), 0)
+        late = np.maximum(np.arange(len(found)) - self.latency_rows, 0)
         return np.asarray(np.sqrt(np.mean(np.sum((found[late] - self.log.positions_mm) ** 2, axis=-1), axis=-1)))
 
 

@@ -61,7 +61,7 @@ def _draw_shapes(axis: Axes, found: Estimates) -> None:
     for row in np.linspace(0, pressed, SHOWN, endpoint=False).astype(int):
         axis.plot(*found.shapes[row].nodes[:, :space].T, color=SHAPE, lw=1, alpha=0.25)
     if found.log.nodes.size:
-        late = min(pressed + round(float(found.known[-1].latency)), len(found.shapes) - 1)
+        late = min(pressed + found.latency_rows, len(found.shapes) - 1)
         axis.plot(*found.log.positions_mm[late].T, "x", color=MEASURED, label="measured")
         axis.legend(loc="lower right", fontsize=8)
     times, label = time_axis(found)

@@ -68,13 +68,19 @@ def contacts(contact: np.ndarray) -> str:
 
 def summary(found: Estimates) -> dict[str, object]:
     """Return what is known at the end, with standard deviations, and how large the force became."""
-    hidden = {name: float(f"{values[-1]:.{DIGITS}g}") for name, values in _hidden(found).items()}
+    hidden = {name: _rounded(values[-1]) for name, values in _hidden(found).items()}
     largest = int(found.force_n.argmax())
-    force = {"row": int(found.log.rows[largest]), "force_n": float(found.force_n[largest])}
-    at_end = {"rows": len(found.log.rows), "at_the_end": hidden, "latency_rows": float(found.known[-1].latency)}
-    errors = found.position_errors_mm
-    median = {"median_position_error_mm": float(np.median(errors))} if found.log.nodes.size else {}
-    return {**at_end, "largest_force": {**force, "force_std_n": float(found.force_std_n[largest])}, **median}
+    force = {"force_n": _rounded(found.force_n[largest]), "force_std_n": _rounded(found.force_std_n[largest])}
+    largest_force = {"row": int(found.log.rows[largest]), **force}
+    known: dict[str, object] = {"rows": len(found.log.rows), "at_the_end": hidden, "largest_force": largest_force}
+    if found.log.nodes.size:
+        known |= {"latency_rows": found.latency_rows, "latency_rows_std": _rounded(found.known[-1].latency_std)}
+        known |= {"median_position_error_mm": _rounded(np.median(found.position_errors_mm))}
+    return known
+
+
+def _rounded(value: float | np.ndarray) -> float:
+    return float(f"{float(value):.{DIGITS}g}")
 
 
 def _shape_table(found: Estimates) -> tuple[list[str], Iterable[Sequence[object]]]:

@@ -54,8 +54,8 @@ def legend_entries(frame: Frame) -> list[tuple[str, Glyph]]:
         ("backbone", _line(4.0, PALETTE.backbone)),
         ("taut cable" if slack else "cable", _line(1.9, PALETTE.cable)),
         *slack,
-        ("contact, weak to strong", _contacts),
-        ("force", _arrow(LAYOUT.arrow, PALETTE.force_true)),
+        ("contact", _contacts),
+        ("force on obstacle", _arrow(LAYOUT.arrow, PALETTE.force_true)),
         ("estimate", _arrow(LAYOUT.arrow_slim, PALETTE.force_est)),
         ("goal", _line(3.0, PALETTE.desired)),
     ]

@@ -1,7 +1,8 @@
 """Compare the force that ``ccr-gym estimate`` found in the example's log with the truth, which the log does not hold.
 
 Run ``ccr-gym estimate examples/estimate/log.csv --robot examples/estimate/robot.json --scene
-examples/estimate/scene.json``, then ``python examples/estimate/check.py``; it writes check.png.
+examples/estimate/scene.json``, then ``python examples/estimate/check.py``; it writes
+runs/estimate/check.png.
 """
 
 import csv
@@ -23,7 +24,7 @@ class Args:
     """Folder that ``ccr-gym estimate`` wrote."""
     truth: Path = HERE / "truth.csv"
     """The truth."""
-    out: Path = Path("check.png")
+    out: Path = Path("runs/estimate/check.png")
     """Figure to write."""
 
 
@@ -48,7 +49,9 @@ def main(args: Args) -> None:
     axis.plot(time, truth, "k--", lw=1, label="true")
     axis.set(xlabel="time [s]", ylabel="contact force [N]")
     axis.legend()
+    args.out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(args.out, dpi=130)
+    print(f"Written: {args.out}")
 
 
 if __name__ == "__main__":

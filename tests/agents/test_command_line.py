@@ -1,9 +1,10 @@
+import re
 import sys
 
 import pytest
 
 from agents import commands
-from agents.command_line import learner_first
+from agents.command_line import LEARNERS, learner_first
 from agents.config import EvaluateConfig, TrainConfig
 from agents.errors import UserError
 from agents.tuned import DistilledSettings, PPOSettings, SACSettings
@@ -27,6 +28,22 @@ def test_arguments_of_train_come_in_any_order(line, run, learner):
     config = commands.parse(line.split())
     assert isinstance(config, TrainConfig)
     assert (str(config.run), config.learner) == (run, learner)
+
+
+COMMANDS = ("evaluate", "retrain", "sweep", "bench", "reproduce", "estimate", "play")
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, *(f"train {learner}" for learner in LEARNERS)])
+def test_help_says_what_every_option_is_and_its_default(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    with pytest.raises(SystemExit):
+        commands.parse([*command.split(), "--help"])
+    text = " ".join(re.sub("[│╭╮╰╯─]", " ", capsys.readouterr().out).split())
+    options = re.split(r" (?=--[a-z][\w-]*[, ])", text.partition(" show this help message and exit ")[2])
+    options = [option for option in options if not option.endswith(",")]  # of a switch, whose text is at its other form
+    assert options
+    for option in options[1:]:
+        assert re.search(r"[.)\]:;,] \((default: [^ )][^)]*|required)\)", option), option
 
 
 def test_arguments_of_other_commands_stay_where_they_are():

@@ -112,6 +112,10 @@ def drag(page, start, end):
     page.mouse.up()
 
 
+def test_the_page_has_the_name_of_the_command(page):
+    assert page.title() == "ccr-gym play"
+
+
 def test_an_obstacle_dragged_into_the_robot_is_felt(page):
     assert force(page) == 0
     assert status(page, "contacts") == 0

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from agents.bench import kernel, report, space, throughput
+from agents.bench.kernel import contact_mix as mix
+from solver import Robot
 
 
 @pytest.fixture(autouse=True)
@@ -24,11 +26,22 @@ def test_learning():
 
 
 def test_kernel():
-    assert len(list(kernel.contact_mix(200))) == 200
+    assert len(list(kernel.contact_mix(200, Robot.prototype()))) == 200
     alone, one_thread, two_threads = kernel.batch_times(4, steps=3)  # alone less the overhead of a call
     assert np.isfinite(alone)
     assert min(one_thread, two_threads) > 0
     assert kernel.cost([kernel.PUSHED, *kernel.FAR], repeats=2) > 0
+
+
+@pytest.mark.parametrize("model", kernel.MODELS)
+def test_the_contact_mix_is_of_the_model_that_it_is_named_after(model, monkeypatch):
+    robots = []
+    monkeypatch.setattr(kernel, "contact_mix", lambda steps, robot: robots.append(robot) or mix(steps, robot))
+    monkeypatch.setitem(kernel.SEGMENTS, model, (18, 36))
+    found = kernel.mixed(model, 200, 1)
+    assert [robot.model for robot in robots] == [model]
+    assert sum(found["statuses"].values()) == found["steps"] == 200
+    assert found["ipopt_ratio"] == pytest.approx(1e3 * found["ipopt_median_ms"] / found["ipopt_beside_us"])
 
 
 def test_kernel_in_space():

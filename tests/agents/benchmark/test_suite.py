@@ -1,5 +1,6 @@
 import itertools
 import json
+import re
 import shutil
 import sys
 import time
@@ -14,7 +15,7 @@ import torch
 from agents import cli
 from agents.benchmark import report, suite
 from agents.benchmark.evaluate import METRICS, Episode, measure, run_episode, scores
-from agents.benchmark.suite import Entry, play
+from agents.benchmark.suite import CONTROLLERS, Entry, play
 from agents.benchmark.sweep import sweep
 from agents.config import EVALUATION_SEED, PRETRAINED, EvaluateConfig, RetrainConfig, SweepConfig, TrainConfig
 from agents.errors import UserError
@@ -85,13 +86,14 @@ def test_evaluate_writes_table_figures_and_videos(run, tmp_path, monkeypatch, ca
     assert "| PPO |" in (tmp_path / "evaluation.md").read_text()
 
 
-def test_videos_show_the_scene_where_policies_differ_most_of_those_that_can_be_reached():
+def test_videos_show_the_scene_where_policies_differ_most_of_those_where_the_best_reaches_the_set_point():
     def result(errors, reached):
         metrics = {"rmse_mn": np.array([errors]), "success": np.array([reached])}
         return suite.Result(suite.Entry("PI", "CCR/LoadCell-v1", "ideal"), metrics, {})
 
-    results = [result([1.0, 2.0, 9.0], [1, 0, 0]), result([2.0, 5.0, 30.0], [0, 1, 0])]
+    results = [result([1.0, 2.0, 1.0, 40.0], [1, 1, 1, 0]), result([2.0, 5.0, 2.0, 3.0], [0, 0, 0, 1])]
     assert suite.telling_scene(results) == 1
+    assert suite.telling_scene(results[::-1]) == 1
     assert suite.telling_scene([result([1.0, 2.0], [0, 0]), result([9.0, 3.0], [0, 0])]) == 0
 
 
@@ -109,8 +111,15 @@ def test_printed_tables_fit_80_columns_and_leave_out_what_is_empty(capsys):
     report.show(by_id)
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
+    notes = [line.partition(":")[0] for line in lines if re.match(r"\w[\w ]*[\w%]:", line)]
+    assert notes == ["force error", "worst tenth", "steady", "within 5 %", "settled", "overshoot", "peak"]
     assert any("RecurrentPPO" in line and "never" in line for line in lines)
     assert "training" not in report.markdown(by_id)
+
+
+def test_every_column_of_a_table_is_explained():
+    assert {name for name in report.HEADINGS if name != "policy"} == report.NOTES.keys()
+    assert report.PRINTED.keys() <= set(report.HEADINGS)
 
 
 def test_every_policy_plays_the_same_scenes():
@@ -182,6 +191,30 @@ def test_a_sweep_goes_on_where_it_was_left(tmp_path, monkeypatch, capsys):
     assert "Best of 6" in capsys.readouterr().out
     study = optuna.load_study(study_name=None, storage=f"sqlite:///{tmp_path}/PI-LoadCell-v1.db")
     assert len({tuple(trial.params.values()) for trial in study.trials}) == 6
+
+
+@pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "Oracle"])
+def test_a_sweep_tunes_every_controller(name, tmp_path, monkeypatch):
+    def instead(policy, *_, **__):
+        tried.append(policy)
+        return np.zeros(1)
+
+    tried = []
+    monkeypatch.setattr("agents.benchmark.sweep.scores", instead)
+    arguments = ["sweep", "--what", name, "--env-id", "CCR/LoadCell-v1", "--trials", "2", "--out", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["ccr-gym", *arguments])
+    cli.main()
+    shipped = CONTROLLERS[name]("CCR/LoadCell-v1", "realistic")
+    assert [(type(policy), policy.name) for policy in tried] == [(type(shipped), shipped.name)] * 2
+    study = optuna.load_study(study_name=None, storage=f"sqlite:///{tmp_path}/{name}-LoadCell-v1.db")
+    first, second = (trial.params for trial in study.trials)
+    assert first.keys() == second.keys()
+    assert first != second
+
+
+def test_a_sweep_has_no_oracle():
+    with pytest.raises(ValueError, match="what is 'Oracle'; it must be one of P, PI, MPC, Harmonic, Newton"):
+        SweepConfig(what="Oracle")
 
 
 @pytest.mark.parametrize("learner", sorted(LEARNERS))

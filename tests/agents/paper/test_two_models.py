@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.image import imread
 
 from agents.paper.scenes import CASES, page, read, states
-from agents.paper.two_models import draw_case
+from agents.paper.two_models import arrows, draw_case
 from solver import Status
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -37,6 +38,17 @@ def test_both_robots_touch_and_only_the_paper_kinks(case, pairs):
 def test_sphere_is_that_of_the_kirchhoff_rod(pairs):
     """The force of the design's independent solution, with GJ/EI 0.75 instead of 0.77."""
     assert read(pairs["sphere"]["rod"]).force == pytest.approx(0.1417, rel=0.01)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_arrows_are_forces_on_the_obstacles_to_scale(case, pairs):
+    for state in pairs[case.name].values():
+        shown = arrows(state, 100.0)
+        pushing = [index for index, force in enumerate(state.forces) if force.any()]
+        assert [arrow.obstacle for arrow in shown] == pushing
+        for arrow in shown:
+            assert arrow.vector == pytest.approx(-100.0 * state.forces[arrow.obstacle], rel=1e-12)
+            assert arrow.force == pytest.approx(np.linalg.norm(state.forces[arrow.obstacle]), rel=1e-12)
 
 
 def test_picture_is_drawn_alike_every_time(pairs, tmp_path):

@@ -6,6 +6,7 @@ import pytest
 from agents.play.choices import MODELS, SENSINGS, Choices, drivers
 from agents.play.dragging import FARTHEST
 from agents.play.session import Session
+from agents.play.shapes import contacts_of, to_page
 from ccr_gym import ENV_IDS
 from solver import PRESETS, Status
 
@@ -48,6 +49,29 @@ def test_an_obstacle_dragged_into_the_robot_pushes_it(env_id):
     assert after.contacts.touched == {0}
     assert np.abs(after.shape.nodes - before.shape.nodes).max() > 0.01
     assert max(session.equilibrium.residuals()) < 1e-6
+
+
+@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/BracedPush-v1", "CCR/SpatialPush-v1"])
+def test_arrows_point_from_the_contact_into_the_regulated_obstacle(env_id):
+    """As in the environments' own pictures: what the robot exerts, the opposite of the force on it."""
+    session = Session(Choices(env_id=env_id, driver="Oracle"))
+    contacts, equilibrium = run(session, 60).contacts, session.equilibrium
+    target, scales = session.env.task.target or 0, session.env.settings.scales
+    touching = to_page(equilibrium.points[equilibrium.contact[target]], scales.length_mm)
+    force, shaft = to_page(equilibrium.forces[target], 1.0), np.diff(contacts.arrow_true, axis=0)[0]
+    size = np.linalg.norm(force)
+    assert size > 0
+    np.testing.assert_allclose(shaft / np.linalg.norm(shaft), -force / size, atol=1e-9)
+    tail = contacts.arrow_true[0]
+    assert np.linalg.norm(touching - tail, axis=1).min() < 0.06
+    assert np.diff(contacts.arrow_est, axis=0)[0] @ force < 0
+
+
+def test_an_estimate_without_a_contact_has_no_arrow():
+    session = Session(Choices())
+    assert not session.equilibrium.contact.any()
+    contacts = contacts_of(session.equilibrium, np.zeros(2), np.ones(2), None, session.env.settings.scales)
+    assert not np.diff(contacts.arrow_est, axis=0).any()
 
 
 def test_a_blocked_obstacle_stays_and_says_so():

@@ -1,9 +1,11 @@
 """The force that a log tells agrees with a truth that it does not hold."""
 
 import csv
+import json
 import math
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 from agents import cli, estimate_log, read_instruments, read_log
 from agents.replay import run as replay
 from agents.replay.log import Log
+from agents.replay.results import summary
 from ccr_gym import PushObstacleEnv, SpatialPushEnv
 from solver import Actuation, Cable, Circle, Robot, Scene
 from solver.spatial import Sphere
@@ -115,6 +118,9 @@ def test_the_example_agrees_with_its_truth(tmp_path, monkeypatch, capsys):
     shapes = columns(tmp_path / "shape.csv")
     assert len(shapes["node"]) == len(true) * 19
     assert (tmp_path / "estimate.png").stat().st_size > 20_000
+    known = json.loads((tmp_path / "estimate.json").read_text())
+    assert known["latency_rows"] == float(truth["latency_rows"][0])
+    assert type(known["latency_rows"]) is int
     checked = runpy.run_path(str(EXAMPLE / "check.py"))
     checked["main"](checked["Args"](results=tmp_path, out=tmp_path / "check.png"))
     assert "within two standard deviations in 1" in capsys.readouterr().out
@@ -162,6 +168,15 @@ def test_a_missing_file_is_one_line(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         cli.main()
     assert capsys.readouterr().err == f"ccr-gym: {tmp_path / 'no.json'}: No such file or directory\n"
+
+
+def test_what_is_known_at_the_end_has_six_digits_and_no_latency_without_positions():
+    log, robot = read_log(EXAMPLE / "log.csv", Robot.prototype()), Robot.prototype()
+    blind = replace(log, nodes=np.zeros(0, int), positions_mm=np.zeros((len(log.rows), 0, 2)))
+    known = summary(estimate_log(blind, robot, Scene(CIRCLE), read_instruments(None, robot)))
+    assert set(known) == {"rows", "at_the_end", "largest_force"}
+    for value in (*known["at_the_end"].values(), *known["largest_force"].values()):
+        assert value == float(f"{value:.6g}")
 
 
 def test_columns_that_were_not_logged_are_not_written(tmp_path):
