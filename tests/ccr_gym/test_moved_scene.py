@@ -73,7 +73,7 @@ def test_a_load_cell_reads_that_an_obstacle_has_pulled_a_cable_out():
 
 
 def test_the_known_scene_is_the_one_that_an_obstacle_was_moved_to():
-    """Also where the nominal robot, whose cable is at the encoder, cannot give way to the obstacle as the robot does."""
+    """Also where the nominal robot, whose cable is at the encoder, cannot give way as the robot does."""
     for seed in range(6):
         env = gymnasium.make("CCR/PushObstacle-v1", sensing="realistic", obs_mode="dict").unwrapped
         env.reset(seed=seed)
