@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.arguments import check_kind, check_whole
-from agents.environment import EnvIndex
+from agents.environment import EnvIndex, require_entries
 from agents.estimation.candidates import ALL, Candidates, Loops
 from agents.estimation.force import SATURATED, ForceFilter, Work
+from agents.estimation.inputs import check_observation, check_robots, entry_sizes
 from agents.estimation.lever import LEAST_LEVER, BentLevers
 from agents.estimation.shape import observed_commands, observed_ratios
 from agents.estimation.tension import Pulls, TensionFilter
@@ -79,7 +80,8 @@ class RobotEstimator:
     def __init__(self, settings: Settings | SpatialSettings, count: int) -> None:
         check_kind("settings", settings, (Settings, SpatialSettings), "take those of an environment")
         check_whole("count", count, 1, 2**31 - 1)
-        self._settings, self._actuation = settings, settings.actuation
+        self._settings, self._actuation, self._count = settings, settings.actuation, count
+        self._needed, self._others = entry_sizes(settings)
         self._takes_estimate = settings.regulate == "estimate"
         self._pairs = settings.robot.model == "paper" and isinstance(settings, SpatialSettings)
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
@@ -105,7 +107,12 @@ class RobotEstimator:
         self._share = np.zeros(count)  # of the force, that the regulated obstacle had in the model
 
     def reset(self, index: EnvIndex = ALL) -> None:
-        """Start new episodes of some robots."""
+        """Start new episodes of some robots.
+
+        Raises:
+            ValueError: If the index chooses robots that are not there, or one twice.
+        """
+        check_robots(index, self._count)
         self.loops.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
@@ -114,7 +121,12 @@ class RobotEstimator:
         self._sums[:, index] = 0.0
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> Knowledge:
-        """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them."""
+        """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them.
+
+        Raises:
+            ValueError: If they are none of these robots with ``obs_mode="dict"``, or not finite; nothing is taken in.
+        """
+        check_observation(observation, self._needed, self._others, check_robots(index, self._count))
         motors = self._range * observation["cable"].astype(float)
         touching = np.asarray(observation["contact"].any(axis=1))
         self.loops.update(motors, index)
@@ -146,8 +158,9 @@ class RobotEstimator:
         )
 
     def update_one(self, observation: Mapping[str, np.ndarray]) -> Knowledge:
-        """Take in the next observation of the only robot, and return what is known of it."""
-        known = self.update({key: value[None] for key, value in observation.items()})
+        """Take in the next observation of the only robot, and return what is known of it; see :meth:`update`."""
+        require_entries(observation)
+        known = self.update({key: np.asarray(value)[None] for key, value in observation.items()})
         return Knowledge(*(entry[0] for entry in known))
 
     def _update_shape(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
@@ -179,7 +192,8 @@ class RobotEstimator:
         if self._pairs:  # one displacement and tension of a pair; the sign says which cable is pulled
             sides = np.where(observation["cable"] < 0, -1.0, 1.0)
             measured = sides * measured
-        limited = np.asarray((np.abs(observation["tension"]) >= SATURATED).any(axis=1))
+        size = np.abs(observation["tension"])
+        limited = np.asarray(((size >= SATURATED) & (size <= 1)).any(axis=1))  # those of a log have no limit
         return Pulls(self._actuation.forces(measured), sides, limited), free, observation["lever"].astype(float)
 
     def _carried(self, free: np.ndarray, motors: np.ndarray, places: np.ndarray, index: EnvIndex) -> np.ndarray:
