@@ -168,8 +168,7 @@ template <class Model>
 bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, double remaining) {
   double& step = pursuit.step;
   if (step > kPeakStep && !pursuit.refined && peaks_at_limit(goal, remaining)) step = kPeakStep;
-  bool stalled = layout_.cables.size == 1 && is_at_tension_limit() && pulls_cable(goal) &&
-                 goal.length == present_.command.length && !moves_obstacles(goal);
+  bool stalled = stalls_at_once(goal, remaining);
   const double size = step >= remaining - kCommandResolution ? remaining : step;  // leaves no rest to round off
   const Command next = size == remaining ? goal : between(present_.command, goal, size / remaining);
   Move move = Move::kOverTension;

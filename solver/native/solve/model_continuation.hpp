@@ -137,6 +137,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool is_tight() const;
   bool gap_closed() const;
   bool peaks_at_limit(const Command& goal, double remaining);
+  bool stalls_at_once(const Command& goal, double remaining);
   bool approach_tension_limit();
   void share_motion(Command& goal, bool holds) const;
   bool pushes(const Tensions& tensions) const;

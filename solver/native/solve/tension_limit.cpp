@@ -48,6 +48,25 @@ bool ModelContinuation<Model>::peaks_at_limit(const Command& goal, double remain
   return try_command(between(present_.command, goal, std::min(1.0, kPeakStep / remaining))) == Move::kOverTension;
 }
 
+// Whether cables stall where they are, since those at the limit of their tension tighten at once: a longer sub-step
+// could end behind a peak that is lower than the work of the cables shows.
+template <class Model>
+bool ModelContinuation<Model>::stalls_at_once(const Command& goal, double remaining) {
+  const Command& here = present_.command;
+  if (!is_at_tension_limit() || !pulls_cable(goal) || goal.length != here.length || moves_obstacles(goal)) return false;
+  if (layout_.cables.size == 1) return true;
+  if (problem_.keeps_tensions() ||
+      try_command(between(here, goal, std::min(1.0, kProbe / remaining))) == Move::kRejected)
+    return false;
+  const double limit = problem_.robot().max_tension;
+  for (int k = 0; k < kCables; ++k) {
+    if (tensions_[k] < limit * (1 - kTensionBand) || trial_tensions_[k] < tensions_[k] + kRise * limit) continue;
+    over_limit_ = trial_tensions_;
+    return true;
+  }
+  return false;
+}
+
 // `present_` is below the tension limit, `trial_` above: closes in from below by false position (Illinois), aiming into
 // the middle of the accepted band, with the cables that `trial_` takes beyond the limit: others may be held at it
 // already. False where the branch cannot be followed that far, unless the tension jumps over the limit within the
@@ -224,6 +243,7 @@ bool ModelContinuation<Model>::closes(const ActiveSet& holding, const Command& c
   template void ModelContinuation<Model>::keep_last_held(const Iterate&, const Tensions&, std::size_t); \
   template bool ModelContinuation<Model>::gap_closed() const;                                           \
   template bool ModelContinuation<Model>::peaks_at_limit(const Command&, double);                       \
+  template bool ModelContinuation<Model>::stalls_at_once(const Command&, double);                       \
   template bool ModelContinuation<Model>::approach_tension_limit();                                     \
   template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;                          \
   template bool ModelContinuation<Model>::yield_cables(Command&, double) const;                         \
