@@ -245,7 +245,7 @@ bool ModelContinuation<Model>::give_way(Pursuit& pursuit, const Command& next, d
 // where it has risen beyond what any motion needs, the robot is blocked.
 template <class Model>
 bool ModelContinuation<Model>::refine(Pursuit& pursuit, double size, bool blocked) {
-  if (blocked || result_.reason != Reason::kStuck || pursuit.finest <= kTightStep) {
+  if (blocked || result_.reason != Reason::kStuck || std::min(pursuit.finest, size) <= kTightStep) {
     const bool seized = result_.reason == Reason::kStuck && std::isinf(problem_.robot().max_tension) && is_tight();
     pursuit.reached = blocked || seized ? Status::kBlocked : Status::kGaveUp;
     return false;
