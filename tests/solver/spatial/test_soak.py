@@ -48,12 +48,12 @@ def test_a_long_descent_ends_where_a_segment_folds_over():
 
 
 def test_a_robot_that_no_limit_stops_is_blocked_where_its_tension_has_risen_beyond_what_moves_it():
-    """Descents in ever finer sub-steps used to spend its work at 140 EI/(aL), and again in each step after."""
+    """Each repeat of the command spent the work of a step at 140 EI/(aL), on descents in ever finer sub-steps."""
     setting, generator = setting_of(Episode("space rod", 1170, 1225, 500))
     taken = walk(setting.solver, sample_increments(generator, setting.solver, setting.scale, 500)[:303])
-    robot, blocked = setting.solver.robot, taken.states[-1]
-    assert blocked.tensions.max() > 100 * robot.rigidity / (robot.offset_mm * robot.length_mm)
-    assert blocked.status is Status.BLOCKED
+    robot, far = setting.solver.robot, taken.states[-1]
+    assert far.tensions.max() > 100 * robot.rigidity / (robot.offset_mm * robot.length_mm)
+    assert step(setting.solver, far, taken.commands[-1]).status is Status.BLOCKED
 
 
 def test_a_step_among_contacts_that_wedge_the_robot_stalls_when_it_is_repeated():
