@@ -65,6 +65,7 @@ instructions: $(INSTALL)  ## count instructions of the kernel (needs valgrind)
 soak: $(INSTALL)
 	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m soak --steps 3000000
 	$(BIN)/python -m pytest -k fuzz --hypothesis-profile=default
+	$(BIN)/python -m pytest -n auto --dist worksteal --long --soak 100000 --vector-steps 10000
 
 browser: $(INSTALL)  ## ccr-gym play in a real browser (needs chromium: apt-get install chromium)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt playwright

@@ -38,7 +38,7 @@ def require_env(env: Environment | None) -> Environment:
     return env
 
 
-def require_entries(observation: Observation, *names: str) -> None:
+def require_entries(observation: Mapping[str, np.ndarray], *names: str) -> None:
     """Refuse an observation without named entries, or without those of some names.
 
     Raises:

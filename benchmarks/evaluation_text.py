@@ -64,7 +64,10 @@ def judgement(evaluation: Found) -> str:
 def _judged(policy: str, by_id: Mapping[str, Found]) -> str:
     played = {env_id: here for env_id, here in by_id.items() if policy in here}
     best = _ids(env_id for env_id, here in played.items() if policy == _nearest(here))
-    text = f"**{policy}**, played on {len(played)} environments, has the least force error on {best}"
+    text = (
+        f"**{policy}**, played on {len(played)} environments with realistic sensing, errs least of all but Newton and "
+        f"the oracle on {best}"
+    )
     below = {
         rival: [env_id for env_id, here in beside.items() if _is_below(here[policy], here[rival])]
         for rival in ("PI", "MPC")

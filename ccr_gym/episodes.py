@@ -172,12 +172,14 @@ class EpisodeBatch(Transition):
             ValueError: If the obstacles cannot move there within a step; nothing has changed then.
         """
         batch, adapter = self.batch, self.adapter
+        before = self._layout.cables(batch.blocks[robot]).copy()
         adapter.write_command(batch.commands, self._actuated_mm[robot], robot)
         batch.move(robot, [scene])
         blocks, now = batch.blocks[robot], batch.scene(robot)
         self._actuated_mm[robot] = adapter.actuated_mm(blocks, self._actuated_mm[robot])
         if self._sensors is not None:
-            self.model.move(robot, [now])
+            self._note_moves(self._sensors, before, blocks, robot)
+            self._move_model(robot, now)
         if adapter.obstacle_size:
             self._obstacle_features[robot] = adapter.obstacle_features(now)
         back_mm = -self._motion_mm(robot)
@@ -185,6 +187,17 @@ class EpisodeBatch(Transition):
         self._sense(robot)
         self._estimate(robot)
         return now
+
+    def _move_model(self, robot: int, scene: Scene) -> None:
+        """Move the obstacles of a robot's model to where those of the robot are.
+
+        A model that cannot give way, as its cable is where the encoder reads it, goes there anew from the robot itself.
+        """
+        self.model.move(robot, [scene])
+        if self.model.scene(robot) != scene:
+            self.model.set_rows([robot], self.batch.get_rows([robot]))
+            self.adapter.write_command(self.model.commands, self._encoders(robot), robot)
+            self.model.move(robot)
 
     def _motion_mm(self, robot: int) -> np.ndarray:
         """Return how far the task has moved the obstacles of a robot since the start, ``(d,)`` [mm]."""

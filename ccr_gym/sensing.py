@@ -23,7 +23,7 @@ from solver.common.validation import SMALLEST
 Range = tuple[float, ...]
 DELAYED_KEYS = ("force_error", "force_measured", "frames", "nodes")  # what a camera and a force sensor tell
 HISTORY = 8  # observations kept, more than the largest latency
-MAX_LOSS = 0.9  # share of the tension that friction takes at most
+MAX_LOSS, MAX_SIZE = 0.9, 1e6  # largest share of friction; largest play, noise or error [natural units]
 DEGREE = math.pi / 180
 NUMBERS = (
     "latency",
@@ -75,14 +75,14 @@ class Sensing:
     """
 
     latency: Range = checked((1, 4), check_range, whole=True, low=0, high=HISTORY - 1)
-    backlash: Range = checked((0.025, 0.075), check_range, low=0)
+    backlash: Range = checked((0.025, 0.075), check_range, low=0, high=MAX_SIZE)
     rigidity_ratio: Range = checked((0.3, 3.0), check_range, low=SMALLEST)
     tendon_loss: Range = checked((0.0, 0.3), check_range, low=0, high=MAX_LOSS)
-    tension_noise: Range = checked((0.006, 0.015), check_range, low=0)
-    tension_zero: Range = checked((0.0, 0.03), check_range, low=0)
-    force_noise: Range = checked((0.065, 0.26), check_range, low=0)
-    force_bias: Range = checked((0.0, 0.4), check_range, low=0)
-    force_resolution: Range = checked((0.0, 0.13), check_range, low=0)
+    tension_noise: Range = checked((0.006, 0.015), check_range, low=0, high=MAX_SIZE)
+    tension_zero: Range = checked((0.0, 0.03), check_range, low=0, high=MAX_SIZE)
+    force_noise: Range = checked((0.065, 0.26), check_range, low=0, high=MAX_SIZE)
+    force_bias: Range = checked((0.0, 0.4), check_range, low=0, high=MAX_SIZE)
+    force_resolution: Range = checked((0.0, 0.13), check_range, low=0, high=MAX_SIZE)
     angle_noise: Range = checked((0.6 * DEGREE, 0.6 * DEGREE), check_range, low=0, high=1)
     angle_error: Range = checked((0.5 * DEGREE, 0.5 * DEGREE), check_range, low=0, high=1)
     place_noise: Range = checked((0.002, 0.002), check_range, low=0, high=1)

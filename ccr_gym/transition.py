@@ -247,12 +247,16 @@ class Transition:
         blocks = batch.blocks[index]
         self._actuated_mm[index] = adapter.actuated_mm(blocks, commanded)
         if sensors is not None:
-            sides = adapter.signed(blocks, np.ones(before.shape))  # of a pair the other cable moves the other way
-            sensors.move_cables(sides * before, sides * self._layout.cables(blocks), index)
+            self._note_moves(sensors, before, blocks, index)
             adapter.write_command(self.model.commands, sensors.motor_mm(index), index)
             self.model.move(index)
         self._sense(index)
         self._estimate(index)
+
+    def _note_moves(self, sensors: SensorModel, before_mm: np.ndarray, blocks: np.ndarray, index: EnvIndex) -> None:
+        """Note which way cables have moved from displacements ``(..., cables)`` [mm]."""
+        sides = self.adapter.signed(blocks, np.ones(before_mm.shape))  # of a pair the other cable moves the other way
+        sensors.move_cables(sides * before_mm, sides * self._layout.cables(blocks), index)
 
     def _sense(self, index: EnvIndex) -> None:
         """Read the tensions, and note those of robots of the model that nothing touches."""

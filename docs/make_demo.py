@@ -68,7 +68,7 @@ def thumbnail(env_id: str) -> Image.Image:
     box = SPACE if "Spatial" in env_id else PLANE
     scene = picture.crop(tuple(round(part * size) for part, size in zip(box, picture.size * 2, strict=True)))
     small = scene.resize((round(HEIGHT * scene.width / scene.height), HEIGHT), Image.Resampling.LANCZOS)
-    return small.quantize(64, dither=Image.Dither.NONE)
+    return small.quantize(64, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
 
 
 if __name__ == "__main__":

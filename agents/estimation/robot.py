@@ -6,12 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.arguments import check_kind, check_whole
-from agents.environment import EnvIndex
+from agents.environment import EnvIndex, require_entries
 from agents.estimation.candidates import ALL, Candidates, Loops
 from agents.estimation.force import SATURATED, ForceFilter, Work
+from agents.estimation.inputs import check_observation, check_robots, entry_sizes
 from agents.estimation.lever import LEAST_LEVER, BentLevers
 from agents.estimation.shape import observed_commands, observed_ratios
-from agents.estimation.tension import TensionFilter
+from agents.estimation.tension import Pulls, TensionFilter
 from ccr_gym import EXACT, Settings, SpatialSettings
 
 SEEN = 1.2  # standard deviation of a seen command, over that of the angle of a disk
@@ -27,6 +28,7 @@ MODEL_ERROR = 0.02  # standard deviation of virtual work over the force
 LEVER_ERROR = 0.005  # standard deviation of a lever [L/a]
 STALL_ERROR = 0.3  # likewise over the force, of a robot that stalls, whose cable does not follow the motor
 LARGE = 12.0  # force on the nominal robot, from which on virtual work tells little [EI/L²]
+ESTIMATE_ERROR = 0.05  # of the observed estimate over the force, for each EI/L² that bends the robot
 
 
 class Knowledge(NamedTuple):
@@ -38,7 +40,7 @@ class Knowledge(NamedTuple):
         cables: Where the cables are, ``(k, c)`` [a].
         loss: Share of the tension that friction takes.
         rigidity: Rigidity over its nominal value.
-        force: Magnitude of the contact force [EI/L²].
+        force: Magnitude of the contact force that is regulated [EI/L²].
         latency_std, half_backlash_std, loss_std, rigidity_std, force_std: Their standard deviations, ``(k,)``.
     """
 
@@ -60,7 +62,8 @@ class RobotEstimator:
 
     Backlash and latency come from the seen shape, rigidity, friction and zeros of the sensors from tensions, and the
     contact force from virtual work: what the cable pulls more than the free robot needs, over the lever of the contact.
-    A force sensor, where there is one, corrects the force with the delay that was found.
+    A force sensor, where there is one, corrects the force with the delay that was found. Where the observed estimate of
+    the force is what is regulated, or all that tells the force, it is taken instead.
 
     Offset and length of random robots are read from the observation. Where ``randomize`` hides them, the offset is
     found beside the backlash, and the length is taken for the nominal one.
@@ -77,7 +80,9 @@ class RobotEstimator:
     def __init__(self, settings: Settings | SpatialSettings, count: int) -> None:
         check_kind("settings", settings, (Settings, SpatialSettings), "take those of an environment")
         check_whole("count", count, 1, 2**31 - 1)
-        self._settings, self._actuation = settings, settings.actuation
+        self._settings, self._actuation, self._count = settings, settings.actuation, count
+        self._needed, self._others = entry_sizes(settings)
+        self._takes_estimate = settings.regulate == "estimate"
         self._pairs = settings.robot.model == "paper" and isinstance(settings, SpatialSettings)
         self._range = settings.cable_limit_mm / settings.scales.travel_mm
         self._tension_span = settings.tension_span
@@ -102,7 +107,12 @@ class RobotEstimator:
         self._share = np.zeros(count)  # of the force, that the regulated obstacle had in the model
 
     def reset(self, index: EnvIndex = ALL) -> None:
-        """Start new episodes of some robots."""
+        """Start new episodes of some robots.
+
+        Raises:
+            ValueError: If the index chooses robots that are not there, or one twice.
+        """
+        check_robots(index, self._count)
         self.loops.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
@@ -111,25 +121,33 @@ class RobotEstimator:
         self._sums[:, index] = 0.0
 
     def update(self, observation: Mapping[str, np.ndarray], index: EnvIndex = ALL) -> Knowledge:
-        """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them."""
+        """Take in the next observations of some robots, arrays ``(k, ...)``, and return what is known of them.
+
+        Raises:
+            ValueError: If they are none of these robots with ``obs_mode="dict"``, or not finite; nothing is taken in.
+        """
+        check_observation(observation, self._needed, self._others, check_robots(index, self._count))
         motors = self._range * observation["cable"].astype(float)
         touching = np.asarray(observation["contact"].any(axis=1))
         self.loops.update(motors, index)
         shape = self._update_shape(observation, index)
         places = self.loops.places[index, 0]
-        tensions, free, levers = self._tensions(observation)
+        pulls, free, levers = self._tensions(observation)
         nominal = self._carried(free, motors, places, index)
-        self._tension.update(tensions, nominal, self.loops, touching, index)
+        self._tension.update(pulls, nominal, self.loops, touching, index)
         weights, delays = _posteriors(shape, self._tension.log_likelihood[index])
         play = weights.sum(axis=2)
-        work = self._virtual_work(tensions, nominal, levers, weights, index)
+        work = self._virtual_work(pulls, nominal, levers, weights, index)
         latency = _moments(self._candidates.latencies, delays)
         rigidity = self._tension.rigidity[index], self._tension.variance[index]
         mean = (weights * rigidity[0]).sum(axis=(1, 2))
         if "lever" in observation:
-            work = self._bent(work, mean, observation, index)
+            work = self._bent(work, mean, observation, pulls, index)
         work, pressing = self._on_target(work, observation, touching, index)
-        force, force_std = self._force.update(observation, work, latency[0], pressing, index)
+        if self._takes_estimate or not observation.keys() & {"tension", "force_measured"}:
+            force, force_std = self._estimated(observation)
+        else:
+            force, force_std = self._force.update(observation, work, latency[0], pressing, index)
         spread = (weights * (rigidity[1] + (rigidity[0] - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
         half = _moments(self._candidates.plays, play, PLAY_ERROR)
         loss = _moments(self._candidates.losses, weights.sum(axis=1), LOSS_ERROR)
@@ -140,8 +158,9 @@ class RobotEstimator:
         )
 
     def update_one(self, observation: Mapping[str, np.ndarray]) -> Knowledge:
-        """Take in the next observation of the only robot, and return what is known of it."""
-        known = self.update({key: value[None] for key, value in observation.items()})
+        """Take in the next observation of the only robot, and return what is known of it; see :meth:`update`."""
+        require_entries(observation)
+        known = self.update({key: np.asarray(value)[None] for key, value in observation.items()})
         return Knowledge(*(entry[0] for entry in known))
 
     def _update_shape(self, observation: Mapping[str, np.ndarray], index: EnvIndex) -> np.ndarray:
@@ -164,15 +183,18 @@ class RobotEstimator:
         misfit = (ee - e**2 * weight).sum(axis=2) - (ep - e * p * weight).sum(axis=2) ** 2 / precision
         return np.asarray(-0.5 * misfit / self._seen_std**2 - 0.5 * np.log(precision / self._scale_prior))
 
-    def _tensions(self, observation: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return measured and nominal free tensions as forces on the commands, and levers, ``(k, c)`` each."""
+    def _tensions(self, observation: Mapping[str, np.ndarray]) -> tuple[Pulls, np.ndarray, np.ndarray]:
+        """Return what is measured, free nominal tensions as forces on the commands, and levers, ``(k, c)`` each."""
+        zero, sides = np.zeros(observation["cable"].shape), np.ones(observation["cable"].shape)
         if "tension" not in observation:
-            zero = np.zeros(observation["cable"].shape)
-            return zero, zero, zero
+            return Pulls(zero, sides, np.zeros(len(zero), bool)), zero, zero
         measured, free = (self._tension_span * observation[key].astype(float) for key in ("tension", "free_tension"))
         if self._pairs:  # one displacement and tension of a pair; the sign says which cable is pulled
-            measured = np.where(observation["cable"] < 0, -measured, measured)
-        return self._actuation.forces(measured), free, observation["lever"].astype(float)
+            sides = np.where(observation["cable"] < 0, -1.0, 1.0)
+            measured = sides * measured
+        size = np.abs(observation["tension"])
+        limited = np.asarray(((size >= SATURATED) & (size <= 1)).any(axis=1))  # those of a log have no limit
+        return Pulls(self._actuation.forces(measured), sides, limited), free, observation["lever"].astype(float)
 
     def _carried(self, free: np.ndarray, motors: np.ndarray, places: np.ndarray, index: EnvIndex) -> np.ndarray:
         """Return free tensions ``(k, c, B)`` where the cables are, from those at the motors; they are linear in both.
@@ -185,7 +207,7 @@ class RobotEstimator:
         return np.asarray(slopes[..., None] * places)
 
     def _virtual_work(
-        self, tensions: np.ndarray, nominal: np.ndarray, levers: np.ndarray, weights: np.ndarray, index: EnvIndex
+        self, pulls: Pulls, nominal: np.ndarray, levers: np.ndarray, weights: np.ndarray, index: EnvIndex
     ) -> Work:
         """Return the force that virtual work of the free robot tells.
 
@@ -193,7 +215,7 @@ class RobotEstimator:
         """
         filtered = self._tension
         factors, levers = filtered.factors(self.loops, index), levers[:, :, None, None]
-        robot, doubt = filtered.robot_tensions(tensions, index)
+        robot, doubt = filtered.robot_tensions(pulls, index)
         lacking = robot - filtered.rigidity[index][:, None] * nominal[..., None]
         size = np.maximum((levers**2).sum(axis=1), LEAST_LEVER**2)
         along = (levers * lacking).sum(axis=1) / size
@@ -206,7 +228,14 @@ class RobotEstimator:
         white = ((levers / factors) ** 2).sum(axis=1) * filtered.noise**2 / size**2
         return Work(mean, (weights * slow).sum(axis=(1, 2)), (weights * white).sum(axis=(1, 2)))
 
-    def _bent(self, work: Work, rigidity: np.ndarray, observation: Mapping[str, np.ndarray], index: EnvIndex) -> Work:
+    def _bent(
+        self,
+        work: Work,
+        rigidity: np.ndarray,
+        observation: Mapping[str, np.ndarray],
+        pulls: Pulls,
+        index: EnvIndex,
+    ) -> Work:
         """Return the force for the levers of the robots that it bends."""
         own, length, offset = observed_ratios(observation, self._settings)
         unit = rigidity * own / length**2
@@ -215,7 +244,7 @@ class RobotEstimator:
         force, large = work.force / change, LARGE * self._actuation.sections**2
         error = np.hypot(MODEL_ERROR, LEVER_ERROR / lever) + self._unknown * np.abs(1 - 1 / change)
         error = np.minimum(error + (force / unit / large) ** 4, 1.0) + STALL_ERROR * (self._tension.stalls[index] > 0)
-        error = error + (np.abs(observation["tension"]) >= SATURATED).any(axis=1)
+        error = error + pulls.limited
         return Work(force, work.slow / change**2 + (error * force) ** 2, work.white / change**2)
 
     def _on_target(
@@ -232,6 +261,16 @@ class RobotEstimator:
         self._share[index] = share
         slow = share**2 * work.slow + error * work.force**2
         return Work(share * work.force, slow, share**2 * work.white), touching & (share > 0)
+
+    def _estimated(self, observation: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the magnitude of the observed estimate of the force and its standard deviation, ``(k,)`` each."""
+        estimate = observation["force_est"].astype(float)
+        force = np.linalg.norm(self._settings.force_span * estimate, axis=1)
+        limited = (np.abs(estimate) >= SATURATED).any(axis=1)
+        own, length, _ = observed_ratios(observation, self._settings)
+        bent = force * length**2 / own / self._actuation.sections**2
+        error = 0.0 if self._takes_estimate else np.minimum(MODEL_ERROR + ESTIMATE_ERROR * bent, 1.0)
+        return force, np.where(limited, 1.0, error) * force
 
 
 def _hidden_scale(settings: Settings | SpatialSettings) -> tuple[float, float]:

@@ -6,6 +6,8 @@ while the cable moves in, ``1 − η`` while it moves out. In contact the tensio
 cable, the same in both directions; what breaks that counts against a candidate.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from agents.environment import EnvIndex
@@ -19,6 +21,20 @@ TRUST = 0.1  # share of the evidence in contact that counts, as errors of neighb
 STALLED = 0.9  # tension over its limit, from which on a robot may have stalled
 STALL_STEPS = 8  # after a stall, in which a late shape and a motor that ran ahead of its cable tell nothing
 LEAST = 1e-3  # of standard deviations, for candidates without noise [EI/(aL)]
+
+
+class Pulls(NamedTuple):
+    """Tensions that are measured of k robots.
+
+    Attributes:
+        forces: What the motors see as forces on the commands, ``(k, c)`` [EI/(aL)].
+        sides: −1 where the other cable of a pair is pulled, and the zero counts against it, otherwise 1, ``(k, c)``.
+        limited: Whether a load cell is at its limit, ``(k,)`` bool: then the tension is at least what it reads.
+    """
+
+    forces: np.ndarray
+    sides: np.ndarray
+    limited: np.ndarray
 
 
 class TensionFilter:
@@ -73,13 +89,11 @@ class TensionFilter:
         self._onset[index] = np.inf
         self.rigidity[index], self.variance[index] = self._usual, self.noise**2 / self._ridge
 
-    def update(
-        self, tensions: np.ndarray, nominal: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
-    ) -> None:
+    def update(self, pulls: Pulls, nominal: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex) -> None:
         """Take in the tensions of the next step of some robots.
 
         Args:
-            tensions: What the motors see as forces on the commands, ``(k, c)`` [EI/(aL)].
+            pulls: What is measured.
             nominal: Tension of the nominal free robot where its cables are, ``(k, c, B)`` [EI/(aL)].
             loops: Where the cables are.
             touching: Whether the model says that something touches, ``(k,)`` bool.
@@ -88,9 +102,9 @@ class TensionFilter:
         places, factors = loops.places[index, 0], self.factors(loops, index)
         size = np.abs(places).max(axis=(1, 2))
         self._onset[index] = np.where(touching, np.minimum(self._onset[index], size), self._onset[index])
-        free = ~touching & (size < self._onset[index] - self._margin)
-        self._update_free(tensions, nominal, factors, free, index)
-        self._update_contact(tensions, places, loops, touching, index)
+        free = ~touching & ~pulls.limited & (size < self._onset[index] - self._margin)
+        self._update_free(pulls, nominal, factors, free, index)
+        self._update_contact(pulls, places, loops, touching, index)
         self.log_likelihood[index] = self._evidence(index) + self._broken[index]
 
     def factors(self, loops: Loops, index: EnvIndex) -> np.ndarray:
@@ -98,14 +112,14 @@ class TensionFilter:
         return np.asarray(np.where(loops.moved_in[index][..., None], 1 / self._kept, self._kept))
 
     def _update_free(
-        self, tensions: np.ndarray, nominal: np.ndarray, factors: np.ndarray, wanted: np.ndarray, index: EnvIndex
+        self, pulls: Pulls, nominal: np.ndarray, factors: np.ndarray, wanted: np.ndarray, index: EnvIndex
     ) -> None:
-        x, y = nominal[..., None] * factors, tensions[..., None, None]
+        x, y = (pulls.sides[..., None] * nominal)[..., None] * factors, (pulls.sides * pulls.forces)[..., None, None]
         counted = wanted[:, None, None, None]
         terms = (np.ones_like(x), x, np.broadcast_to(y, x.shape), x * x, x * y)
         for total, term in zip(self._sums, terms, strict=True):
             total[index] += np.where(counted, term, 0.0)
-        self._squares[index] += np.where(wanted[:, None], tensions**2, 0.0)
+        self._squares[index] += np.where(wanted[:, None], pulls.forces**2, 0.0)
 
     def _evidence(self, index: EnvIndex) -> np.ndarray:
         """Solve for rigidity and zeros of each candidate, and return its log-likelihood, ``(k, B, E)``.
@@ -123,15 +137,15 @@ class TensionFilter:
         misfit = cyy + self._ridge * self._usual**2 + mean * (mean * precision - 2 * product)
         return np.asarray(COUNTED * (-0.5 * misfit / self.noise**2 - 0.5 * np.log(precision)))
 
-    def robot_tensions(self, tensions: np.ndarray, index: EnvIndex) -> tuple[np.ndarray, np.ndarray]:
+    def robot_tensions(self, pulls: Pulls, index: EnvIndex) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and variance of the tensions in the robots, as far as directions decide, ``(k, c, B, E)``."""
-        inside, outside = self._both_ways(tensions, index)
+        inside, outside = self._both_ways(pulls, index)
         inward = self.inward[index]
         return _mixed(inward, inside, outside), inward * (1 - inward) * (inside - outside) ** 2
 
-    def _both_ways(self, tensions: np.ndarray, index: EnvIndex) -> np.ndarray:
+    def _both_ways(self, pulls: Pulls, index: EnvIndex) -> np.ndarray:
         """Return the tensions in the robots if the cables last moved in, and if they moved out, ``(2, k, c, B, E)``."""
-        motor = tensions[..., None, None] - self.zeros[index]
+        motor = pulls.forces[..., None, None] - pulls.sides[..., None, None] * self.zeros[index]
         return np.stack([motor * self._kept, motor / self._kept])
 
     def _expected(self, both: np.ndarray, inward: np.ndarray, index: EnvIndex) -> np.ndarray:
@@ -146,20 +160,22 @@ class TensionFilter:
         return np.asarray(np.abs(robot) > STALLED * self._limit * self.rigidity[index][:, None])
 
     def _update_contact(
-        self, tensions: np.ndarray, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
+        self, pulls: Pulls, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex
     ) -> None:
         """Compare tensions in the robot with lines through the latest ones, and add them to these.
 
-        Where it is open which way a cable last moved, the tensions of both directions are compared.
+        Where it is open which way a cable last moved, the tensions of both directions are compared. A tension at its
+        limit is compared with none, and the robot may have stalled.
         """
-        both = self._both_ways(tensions, index)
-        stalled = self._stalled(both[0], index).mean(axis=(2, 3)).max(axis=1) > 0.5
+        both = self._both_ways(pulls, index)
+        stalled = pulls.limited | (self._stalled(both[0], index).mean(axis=(2, 3)).max(axis=1) > 0.5)
         self.stalls[index] = np.where(stalled, STALL_STEPS, np.maximum(self.stalls[index] - 1, 0))
         expected = self._expected(both, loops.inward(index)[..., None], index)
         at = np.broadcast_to(places[..., None], both.shape[1:])
         count, sl, st, sll, slt = (total[index] for total in self._lines)
         spread = sll * count - sl * sl
-        known = touching[:, None, None, None] & (spread > 1e-8 * count * count) & (count > 2)
+        compared = (touching & ~pulls.limited)[:, None, None, None]
+        known = compared & (spread > 1e-8 * count * count) & (count > 2)
         slope = np.where(known, (slt * count - sl * st) / np.where(known, spread, 1.0), 0.0)
         mean_l, mean_t = (total / np.maximum(count, 1e-9) for total in (sl, st))
         leverage = np.where(
@@ -176,7 +192,7 @@ class TensionFilter:
         terms = (np.ones_like(robot), at, robot, at * at, at * robot)
         decay = np.where(touching, SMOOTHNESS, 1.0)[:, None, None, None]
         for total, term in zip(self._lines, terms, strict=True):
-            total[index] = decay * total[index] + np.where(touching[:, None, None, None], term, 0.0)
+            total[index] = decay * total[index] + np.where(compared, term, 0.0)
 
 
 def _judged(expected: np.ndarray, likely: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

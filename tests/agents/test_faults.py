@@ -169,7 +169,9 @@ def limited(size):
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
-@pytest.mark.parametrize(("size", "file"), [(100, "config.json"), (4000, "checkpoint.safetensors")])
+@pytest.mark.parametrize(
+    ("size", "file"), [pytest.param(100, "config.json", marks=pytest.mark.long), (4000, "checkpoint.safetensors")]
+)
 def test_training_on_a_full_disk_goes_on_when_there_is_space(size, file, tmp_path):
     run = tmp_path / "run"
     code, lines = ended(started("train", "--run", run, *SMALL, preexec_fn=limited(size)))
@@ -186,7 +188,7 @@ def test_a_log_that_cannot_be_written_is_named(tmp_path):
 
 
 def test_evaluating_on_a_full_disk_leaves_nothing_half_written(tmp_path):
-    arguments = ["--env-ids", "CCR/LoadCell-v1", "--policies", "PI", "P", "--episodes", 8, "--no-video", "--jobs", 1]
+    arguments = ["--env-ids", "CCR/LoadCell-v1", "--policies", "PI", "P", "--episodes", 2, "--no-video", "--jobs", 1]
     out = tmp_path / "out"
     code, lines = ended(started("evaluate", "--out", out, *arguments, preexec_fn=limited(500)))
     assert_one_line(code, lines[-1:], f"{out / 'evaluation.json'} cannot be written: File too large")

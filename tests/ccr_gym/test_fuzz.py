@@ -114,7 +114,7 @@ def words(name, kwargs):
 def test_arguments(env_id, count, monkeypatch):
     monkeypatch.setattr(ccr_gym.sampling, "MAX_SAMPLES", SAMPLES)
 
-    @fuzzed(env_id, count, short=80, long=150)
+    @fuzzed(env_id, count, short=40, long=150)
     @given(st.sampled_from(arguments(env_id, count)), anything)
     def run(name, value):
         kwargs = given_as(env_id, name, value)
@@ -160,7 +160,7 @@ def operations(env_id, count):
 @EVERY_FORM
 @EVERY_ID
 def test_resets_and_steps(env_id, count):
-    @fuzzed(env_id, count, short=20, long=40)
+    @fuzzed(env_id, count, short=10, long=40)
     @given(st.lists(operations(env_id, count), min_size=1, max_size=6), st.sampled_from(["ideal", "realistic"]))
     def run(sequence, sensing):
         env, twin = (build(env_id, count, sensing=sensing) for _ in range(2))

@@ -1,11 +1,14 @@
 """Obstacles and set-points that are moved within an episode, as by a user's hand."""
 
+from dataclasses import asdict, replace
+
 import gymnasium
 import numpy as np
 import pytest
 
-import ccr_gym  # noqa: F401 - registers the ids
-from solver import Circle, Solver
+from ccr_gym import EXACT
+from ccr_gym.scales import TENSION_SPAN
+from solver import Circle, Robot, Solver
 
 
 @pytest.mark.parametrize("sensing", ["ideal", "realistic"])
@@ -50,3 +53,34 @@ def test_the_set_point_can_be_changed():
     assert info["desired_force"] == pytest.approx(0.123)
     with pytest.raises(ValueError, match="force_n is -1"):
         env.set_desired_force(-1.0)
+
+
+def test_a_load_cell_reads_that_an_obstacle_has_pulled_a_cable_out():
+    """A robot at the limit of its motor gives way: its cable moves out, though its motor stays."""
+    loss, robot = 0.2, replace(Robot.prototype(), max_tension=6.0)
+    sensing = asdict(EXACT) | {"tendon_loss": (loss, loss)}
+    env = gymnasium.make("CCR/PushObstacle-v1", sensing=sensing, robot=robot, obs_mode="dict").unwrapped
+    circle = Circle(center=(30.0, 90.0), radius=15.0)
+    env.reset(seed=0, options={"scene": [circle], "desired_force": 0.2})
+    for _ in range(30):
+        pulled, *_, info = env.step(np.ones(1, np.float32))
+    unit = TENSION_SPAN * env.settings.scales.tension_n
+    assert pulled["tension"] * unit == pytest.approx(info["tension"] / (1 - loss), rel=1e-5)
+    env.move_obstacles([circle.shifted((-3.0, 0.0))])
+    assert env.equilibrium.cable_mm < info["cable_mm"] - 0.1
+    given_way, *_, info = env.step(np.zeros(1, np.float32))
+    assert given_way["tension"] * unit == pytest.approx(info["tension"] * (1 - loss), rel=1e-5)
+
+
+def test_the_known_scene_is_the_one_that_an_obstacle_was_moved_to():
+    """Also where the nominal robot, whose cable is at the encoder, cannot give way as the robot does."""
+    for seed in range(6):
+        env = gymnasium.make("CCR/PushObstacle-v1", sensing="realistic", obs_mode="dict").unwrapped
+        env.reset(seed=seed)
+        for _ in range(20):
+            env.step(np.ones(1, np.float32))
+        now = env.move_obstacles([env.equilibrium.scene.obstacles[0].shifted((-25.0, 0.0))])
+        assert env.get_state().episodes.model.scenes == (now,)
+        observation, *_ = env.step(np.zeros(1, np.float32))
+        assert observation["contact"].any()
+        assert env.equilibrium.contact.any()

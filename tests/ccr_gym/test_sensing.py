@@ -342,6 +342,8 @@ def test_a_fifth_of_the_draws_is_for_tests():
         ({"sensing": {"latency": [0.5, 1.5]}}, "whole numbers"),
         ({"sensing": {"force_noise": [0.2, 0.1]}}, "force_noise is"),
         ({"sensing": {"angle_noise": [0.0, 1.1]}}, "angle_noise is"),
+        ({"sensing": {"tension_zero": [0.0, 1e30]}}, "tension_zero is .* from 0 to 1000000"),
+        ({"sensing": {"tension_noise": [1e7, 1e7]}}, "tension_noise is .* from 0 to 1000000"),
         ({"sensing": {"rigidity_ratio": [0.0, 1.0]}}, "rigidity_ratio is"),
         ({"split": "validation"}, "split is"),
     ],

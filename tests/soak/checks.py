@@ -231,7 +231,8 @@ def _reason(solver, taken, k, repeats=REPEATS):
         return "holes meet"
     if near_zero := _near_zero(state, command):
         return near_zero
-    buckling = 12 * robot.rigidity * (robot.segments / state.length_mm) ** 2
+    softest = min(robot.segment_rigidity or [robot.rigidity]) if robot.model == "rod" else robot.rigidity
+    buckling = 12 * softest * (robot.segments / state.length_mm) ** 2
     if robot.model == "rod" and reason == "work" and state.tensions.sum() > BUCKLED * buckling:
         return "buckled"
     if repeats == 0:
@@ -283,17 +284,22 @@ def _is_pinched(state, command):
 
 
 def _blocked(solver, taken, tally):
-    """Report blocked steps, and whether the command can be reached in another way."""
+    """Report blocked steps that another way passes, or that no limit to what presses explains.
+
+    No motor limits the base: where closed gaps alone keep the robot from being fed or drawn, it is blocked.
+    """
     blocked = np.flatnonzero([state.status == Status.BLOCKED for state in taken.states[1:]])
     tally.blocked += len(blocked)
     findings = []
     if np.isinf(solver.robot.max_tension):  # to first order only: bent another way, the robot may get past
         return findings
     for k in blocked[:MOST_BLOCKED].tolist():
+        after, command = taken.states[k + 1], taken.commands[k]
         passed = _other_ways(solver, taken, k)
         tally.blocked_unconfirmed += passed
-        kind = "blocked, but reached another way" if passed else "blocked"
-        findings.append(Finding(kind, k, taken.states[k + 1].factorizations))
+        if passed or command[-1] == after.length_mm or not is_wedged(after, command):
+            kind = "blocked, but reached another way" if passed else "blocked"
+            findings.append(Finding(kind, k, after.factorizations))
     return findings
 
 

@@ -120,16 +120,16 @@ def _(obstacle: spatial.Box, s):
     return {"center": times(obstacle.center, s), "sizes": times(obstacle.sizes, s), "edge": s * obstacle.edge}
 
 
-def natural(equilibrium, s=1.0):
-    """Return the numbers of an equilibrium of a robot scaled by s, by name, converted to the robot at s = 1.
+def natural(states, s=1.0):
+    """Return the numbers of states of a robot scaled by s, by name, ``(T, ...)``, converted to the robot at s = 1.
 
     With s a power of two the division is exact, so the law is true to the last bit of every number that does not
     vanish.
     """
-    planar = isinstance(equilibrium.robot, Robot)
+    planar = isinstance(states[0].robot, Robot)
     powers = PLANAR_POWERS if planar else SPATIAL_POWERS
-    values = {name: np.asarray(getattr(equilibrium, name)) for name in powers}
+    values = {name: np.array([getattr(state, name) for state in states]) for name in powers}
     nodes = values.pop("nodes")
     numbers = {name: value / s ** powers[name] for name, value in values.items()}
-    numbers |= {"points": nodes[:, :2] / s, "angles": nodes[:, 2]} if planar else {"points": nodes / s}
+    numbers |= {"points": nodes[..., :2] / s, "angles": nodes[..., 2]} if planar else {"points": nodes / s}
     return {name: np.where(np.abs(value) < VANISHING, 0.0, value) for name, value in numbers.items()}

@@ -168,16 +168,35 @@ def test_reference_follows_the_recorded_paths(name):
             assert certificate(there) <= CERTIFIED
 
 
-@pytest.mark.parametrize(
-    ("robot", "obstacle"),
-    [*((PLANAR, shape) for shape in PLANAR_SHAPES), *((SPATIAL, shape) for shape in SPATIAL_SHAPES)],
-    ids=lambda value: value.kind + ("" if value.spring is None else " on a spring") if hasattr(value, "kind") else "",
-)
+AMONG_SHAPES = [*((PLANAR, shape) for shape in PLANAR_SHAPES), *((SPATIAL, shape) for shape in SPATIAL_SHAPES)]
+
+
+def label(value):
+    return value.kind + ("" if value.spring is None else " on a spring") if hasattr(value, "kind") else ""
+
+
+@pytest.mark.parametrize(("robot", "obstacle"), AMONG_SHAPES, ids=label)
 def test_several_cables_and_loads_among_shapes(robot, obstacle):
-    kernel, reference = solvers(robot, Scene([obstacle]))
-    *states, before, last = pull(kernel)
+    *states, last = pull(kernel_of(robot, Scene([obstacle])))
     assert last.contact.any()
     assert all(certificate(state) <= CERTIFIED for state in states[::5])
+    assert certificate(last) <= CERTIFIED
+
+
+@pytest.mark.parametrize(
+    ("robot", "obstacle"),
+    [
+        pytest.param(
+            robot, shape, marks=[] if label(shape) in ("circle on a spring", "custom", "box") else pytest.mark.long
+        )
+        for robot, shape in AMONG_SHAPES
+    ],
+    ids=label,
+)
+def test_the_reference_solver_among_shapes(robot, obstacle):
+    kernel, reference = solvers(robot, Scene([obstacle]))
+    *_, before, last = pull(kernel)
+    assert last.contact.any()
     assert_same(last, reference.step(before, last.cables_mm))
 
 

@@ -232,6 +232,15 @@ int ModelContinuation<Model>::cable_beyond(const Command& ceiling) const {
   return beyond;
 }
 
+// Whether the tension of a cable in `trial_` exceeds the limit that is none of some.
+template <class Model>
+bool ModelContinuation<Model>::exceeds_limit_beside(const std::array<int, kMaxCables>& some, int count) const {
+  for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+    if (trial_tensions_[k] > problem_.robot().max_tension && std::count(some.begin(), some.begin() + count, k) == 0)
+      return true;
+  return false;
+}
+
 // Tries a command among motors that keep their tension, none of which pulls its cable farther in than to a ceiling:
 // what would go beyond is held there. A motor that has no more to let out holds its cable, whatever the tension then.
 template <class Model>
@@ -252,8 +261,10 @@ ModelContinuation<Model>::Move ModelContinuation<Model>::try_below(const Command
     }
     const int beyond = move == Move::kAccepted ? cable_beyond(ceiling) : -1;
     if (move == Move::kAccepted && beyond < 0) return move;
-    if (move != Move::kAccepted) {  // those that were stopped keep their tension in a shorter sub-step
-      const bool jumps = move == Move::kOverTension && shortest;
+    if (move != Move::kAccepted) {
+      // Those that were stopped keep their tension in a shorter sub-step, or on the way to where they snap: they cannot
+      // be held there.
+      const bool jumps = move == Move::kOverTension && shortest && exceeds_limit_beside(stopped, count);
       for (int j = 0; j < count && !jumps; ++j) keep_tension(stopped[j]);
       return count > 0 && !jumps ? Move::kRejected : move;
     }

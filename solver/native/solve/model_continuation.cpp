@@ -134,7 +134,8 @@ Status ModelContinuation<Model>::pursue(Pursuit& pursuit) {
       } else if (is_unyielding()) {
         return Status::kStalled;
       }
-    } else {
+    } else if (pursuit.yielding > kYield) {
+      stop_yielding(pursuit.target, pursuit.wanted);
       pursuit.yielding = kYield;
     }
     Command goal = raise_to_pretension(pursuit.wanted);

@@ -143,6 +143,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool pay_out(const Command& command);
   bool hold_stalled_cables(Command& wanted) const;
   bool yield_cables(Command& wanted, double least) const;
+  void stop_yielding(const Command& target, Command& wanted) const;
   void wait_for_motors(Command& goal) const;
   bool is_unyielding() const;
   bool is_blocked(const Command& command);
@@ -173,6 +174,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Command ceiling(const Command& wanted, const Command& goal, double part) const;
   int unwound_cable() const;
   int cable_beyond(const Command& ceiling) const;
+  bool exceeds_limit_beside(const std::array<int, kMaxCables>& some, int count) const;
   Move try_below(const Command& ceiling, Command command);
 
   // Gaps that no motion satisfies together.

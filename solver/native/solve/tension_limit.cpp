@@ -130,6 +130,16 @@ bool ModelContinuation<Model>::yield_cables(Command& wanted, double least) const
   return changed;
 }
 
+// Leaves cables where their motors hold them again, or lets them out as far as a command does.
+template <class Model>
+void ModelContinuation<Model>::stop_yielding(const Command& target, Command& wanted) const {
+  const Command& here = present_.command;
+  for (int k = 0; k < kCables; ++k) {
+    if (pull(wanted, k) >= pull(here, k)) continue;
+    wanted.cables[k] = pull(target, k) < pull(here, k) ? target.cables[k] : here.cables[k];
+  }
+}
+
 // Keeps other cables from being pulled in while motors yield.
 template <class Model>
 void ModelContinuation<Model>::wait_for_motors(Command& goal) const {
@@ -217,6 +227,7 @@ bool ModelContinuation<Model>::closes(const ActiveSet& holding, const Command& c
   template bool ModelContinuation<Model>::approach_tension_limit();                                     \
   template bool ModelContinuation<Model>::hold_stalled_cables(Command&) const;                          \
   template bool ModelContinuation<Model>::yield_cables(Command&, double) const;                         \
+  template void ModelContinuation<Model>::stop_yielding(const Command&, Command&) const;                \
   template void ModelContinuation<Model>::wait_for_motors(Command&) const;                              \
   template bool ModelContinuation<Model>::is_unyielding() const;                                        \
   template bool ModelContinuation<Model>::is_blocked(const Command&);

@@ -1,11 +1,13 @@
 """How often the truth is within two standard deviations of what the estimator says, whatever moves the robot."""
 
+from dataclasses import asdict
+
 import gymnasium
 import numpy as np
 import pytest
 
 from agents import RobotEstimator, search
-from ccr_gym import ENV_IDS
+from ccr_gym import ENV_IDS, Sensing
 
 IDS = sorted(env_id for env_id in ENV_IDS if "-Paper-" not in env_id)
 NUMBERS = ("latency", "half_backlash", "loss", "rigidity")
@@ -126,6 +128,71 @@ def test_what_is_hidden_of_random_robots_is_doubt_or_found(ranges):
     for name in NUMBERS:
         assert within(rows, truth, name, 32) >= 0.9, name
     assert np.median(np.abs(rows[-1][0].half_backlash - truth["half_backlash"])) < 0.004
+
+
+def pumping(step, observation, known, goal):
+    """Return actions that pull and let go at full speed."""
+    return (1.0 if step < 20 or step // 14 % 2 == 0 else -0.8) * search(observation)
+
+
+def test_a_tension_at_its_limit_tells_nothing_of_latency_loss_and_rigidity():
+    """The tensions of rigid robots pass the limit of the load cell long before they stall, and seem to stay there."""
+    stiff = asdict(Sensing()) | {"rigidity_ratio": (2.0, 3.0)}
+    rows, truth = followed("CCR/PushObstacle-v1", stiff, pumping, 100)
+    limited = np.mean([np.abs(observation["tension"]) >= 1 for *_, observation in rows])
+    assert limited > 0.03
+    for name in ("latency", "loss", "rigidity"):
+        assert within(rows, truth, name, 32) >= 0.97, name
+
+
+def test_a_load_cell_that_is_at_its_limit_for_some_steps_is_not_read_in_these():
+    envs = gymnasium.make_vec("CCR/PushObstacle-v1", 20, sensing="sensorless", obs_mode="dict")
+    observation, _ = envs.reset(seed=0)
+    estimator = RobotEstimator(envs.unwrapped.settings, 20)
+    for step in range(14):
+        limited = {"tension": np.ones_like(observation["tension"])} if step in (5, 6) else {}
+        known = estimator.update(observation | limited)
+        observation = envs.step(np.full((20, 1), 0.5 if step < 8 else -0.5, np.float32))[0]
+        assert not observation["contact"].any()
+    truth = envs.unwrapped.privileged_state.rigidity_ratio
+    assert np.median(np.abs(known.rigidity / truth - 1)) < 0.1
+    assert (np.abs(known.rigidity - truth) <= 2 * known.rigidity_std).mean() >= 0.9
+
+
+def test_the_zero_of_a_pair_of_cables_counts_against_the_one_that_is_pulled():
+    """A pair has one load cell, whose reading is the tension of either cable."""
+    off = asdict(Sensing()) | {"tension_zero": (0.3, 0.3)}
+    rows, truth = followed("CCR/SpatialPush-Paper-v1", off, walking(), 40)
+    for name in NUMBERS:
+        assert within(rows, truth, name, 32) >= 0.93, name
+
+
+@pytest.mark.parametrize("sensing", ["ideal", "realistic", "sensorless"])
+@pytest.mark.parametrize("env_id", ["CCR/LoadCell-Paper-v1", "CCR/SpatialPush-Paper-v1", "CCR/PushObstacle-v1"])
+def test_an_estimate_that_is_regulated_is_the_force(env_id, sensing):
+    """It is observed without an error, whatever a sensor reads of it."""
+    envs = gymnasium.make_vec(env_id, 8, sensing=sensing, regulate="estimate", obs_mode="dict")
+    unit, estimator = envs.unwrapped.settings.scales.force_n, RobotEstimator(envs.unwrapped.settings, 8)
+    observation, _ = envs.reset(seed=0)
+    pressed = 0
+    for _ in range(40):
+        known = estimator.update(observation)
+        regulated = np.linalg.norm(envs.unwrapped.privileged_state.force, axis=1) / unit
+        inside = (np.abs(observation["force_est"]) < 1).all(axis=1)
+        assert known.force[inside] == pytest.approx(regulated[inside], abs=1e-5)
+        assert not known.force_std[inside].any()
+        pressed += (regulated > LEAST_FORCE).sum()
+        observation = envs.step(0.7 * search(observation))[0]
+    assert pressed > 40
+
+
+@pytest.mark.parametrize("walks", [False, True])
+@pytest.mark.parametrize("env_id", [f"CCR/{task}-v1" for task in ("LoadCell", "BracedPush", "SpatialPush")])
+def test_without_imperfections_and_without_a_force_sensor_the_estimate_is_the_force(env_id, walks):
+    rows, _ = followed(env_id, "ideal", walking() if walks else regulating, 30, force_sensor=False)
+    assert force_within(rows) >= 0.98
+    for known, _, observation in rows:
+        assert not known.force[~observation["contact"].any(axis=1)].any()
 
 
 def test_a_tension_at_its_limit_tells_no_force():

@@ -173,7 +173,7 @@ LEARNING = {
 }
 
 
-@pytest.mark.parametrize("name", sorted(LEARNING))
+@pytest.mark.parametrize("name", [pytest.param("PPO", marks=pytest.mark.long), "Distilled"])
 def test_a_run_killed_after_every_checkpoint_learns_as_one_left_alone(name, tmp_path, monkeypatch, request):
     """Mean return of 16 episodes, from about −80 (0 at the first point of an imitation) to 25."""
     for module in (training, distillation):

@@ -112,12 +112,22 @@ def episodes_fixture(pytestconfig):
 @pytest.mark.parametrize("model", [*MODELS, *LOADED])
 def test_powers_of_two_give_the_same_bits(model, s, episodes):
     for index in episodes:
-        solver, taken = episode(model, index)
-        for k, (state, large) in enumerate(zip(taken.states, scaled(solver, taken.commands, s), strict=True)):
-            assert large.status.name == state.status.name, (index, k)
-            expected = natural(state)
-            for name, value in natural(large, s).items():
-                np.testing.assert_array_equal(value, expected[name], f"{name}, episode {index}, step {k}")
+        _, expected, found = both(model, index, s)
+        for name, value in found.items():
+            np.testing.assert_array_equal(value, expected[name], f"{name}, episode {index}, by step")
+
+
+def both(model, index, s):
+    """A solver at s = 1, and the numbers of its walk there and s times as large, by name; their statuses are equal."""
+    solver, taken = episode(model, index)
+    large = scaled(solver, taken.commands, s)
+    assert [state.status.name for state in large] == [state.status.name for state in taken.states], index
+    return solver, unscaled(model, index), natural(large, s)
+
+
+@lru_cache(maxsize=200)
+def unscaled(model, index):
+    return natural(episode(model, index)[1].states)
 
 
 def share_holes(robot, numbers):
@@ -125,24 +135,25 @@ def share_holes(robot, numbers):
     if "tensions" not in numbers:
         return numbers
     holes = [(round(math.cos(c.angle), 9), round(math.sin(c.angle), 9), c.offset_mm, c.end) for c in robot.cables]
-    sums = [sum(t for t, other in zip(numbers["tensions"], holes, strict=True) if other == hole) for hole in holes]
-    return numbers | {"tensions": np.array(sums)}
+    alike = np.array([[hole == other for other in holes] for hole in holes], float)
+    return numbers | {"tensions": numbers["tensions"] @ alike}
 
 
 @pytest.mark.parametrize("s", OTHERS)
 @pytest.mark.parametrize("model", [*MODELS, *LOADED])
 def test_other_scales_give_the_same_robot(model, s, episodes):
     for index in episodes:
-        solver, taken = episode(model, index)
-        length = solver.robot.length_mm
-        for k, (state, large) in enumerate(zip(taken.states, scaled(solver, taken.commands, s), strict=True)):
-            assert large.status.name == state.status.name, (index, k)
-            expected, found = (share_holes(solver.robot, numbers) for numbers in (natural(state), natural(large, s)))
-            for name, unit in (("points", length), ("forces", 1.0), ("tension", 1.0), ("tensions", 1.0)):
-                if name in found:
-                    np.testing.assert_allclose(
-                        found[name], expected[name], rtol=CLOSE, atol=CLOSE * unit, err_msg=f"{name} {index} {k}"
-                    )
+        solver, *walks = both(model, index, s)
+        expected, found = (share_holes(solver.robot, walked) for walked in walks)
+        for name, unit in (("points", solver.robot.length_mm), ("forces", 1.0), ("tension", 1.0), ("tensions", 1.0)):
+            if name in found:
+                np.testing.assert_allclose(
+                    found[name],
+                    expected[name],
+                    rtol=CLOSE,
+                    atol=CLOSE * unit,
+                    err_msg=f"{name}, episode {index}, by step",
+                )
 
 
 @pytest.mark.parametrize(

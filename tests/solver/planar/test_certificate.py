@@ -46,13 +46,13 @@ def test_residuals(model, scene, start, changes):
 @EVERY_MODEL
 @pytest.mark.parametrize(
     ("touch", "scenes"),
-    [({"segments": 9, "between": 1}, 60), ({"segments": 6, "touch": LINES, "between": 3}, 20)],
+    [({"segments": 9, "between": 1}, (24, 60)), ({"segments": 6, "touch": LINES, "between": 3}, (20, 60))],
     ids=["paper", "everywhere"],
 )
-def test_residuals_of_every_shape(random_shapes, model, touch, scenes):
+def test_residuals_of_every_shape(random_shapes, many, model, touch, scenes):
     robot, generator = replace(Robot.prototype(model="paper"), model=model, **touch), np.random.default_rng(3)
     touched, springs = set(), 0
-    for _ in range(scenes):
+    for _ in range(many(*scenes)):
         scene = random_shapes(generator, robot)
         springs += any(scene.mounted)
         changes = generator.uniform(-0.2, 0.6, 40)

@@ -135,10 +135,19 @@ def label(obstacles):
     return "+".join(o.kind + ("" if o.spring is None else " on a spring") for o in obstacles)
 
 
+def marks(name, obstacles):
+    """Without --long the loaded rod is among all obstacles, one model among the fixed ones, the other among springs."""
+    on_springs = any(obstacle.spring for obstacle in obstacles)
+    return pytest.mark.long if name == ("paper" if on_springs else "rod") else []
+
+
 @pytest.fixture(
     scope="module",
-    params=[(robot, obstacles) for obstacles in SCENES for robot in ROBOTS],
-    ids=[f"{label(obstacles)}-{name}" for obstacles in SCENES for name in NAMES],
+    params=[
+        pytest.param((robot, obstacles), id=f"{label(obstacles)}-{name}", marks=marks(name, obstacles))
+        for obstacles in SCENES
+        for robot, name in zip(ROBOTS, NAMES, strict=True)
+    ],
 )
 def case(request):
     """Robot, obstacles, and the sensitivities of their equilibrium: most of the time goes to stating the problem."""

@@ -107,8 +107,11 @@ def test_the_check_sees_the_one_step_that_passed_a_circle():
 
 
 def test_a_robot_whose_disks_meet_at_a_corner_is_wedged():
-    """Drawn back, it cannot bend on round the corner between two of its points: BLOCKED, as its closed gaps confirm."""
+    """Drawn back, it cannot bend on round the corner between two of its points: BLOCKED, as its closed gaps confirm.
+
+    The base has no limit, and what the closed gaps confirm is no finding.
+    """
     tally, cases = play(Episode("rod", 1150, 1761, 500))
-    assert {case["kind"] for case in cases} == {"blocked"}
+    assert cases == []
     assert tally.blocked == 3
     assert tally.blocked_unconfirmed == 0
