@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.optimize import bisect
 
 from agents.arguments import check_real
 from agents.environment import Environment, require_entries, require_env
@@ -14,7 +15,6 @@ from agents.tuned import NEWTON_GAIN
 from ccr_gym import ActionSpec, PrivilegedState, Scales
 
 CLOSER = 0.5  # share of the missing force that a Newton step may leave
-HALVINGS = 40  # of an interval that a set-point lies in
 PROBE = 1e-4  # trial move of a finite difference [a]
 REACHED = 1e-9  # force error that is roundoff, for which no motor crosses its backlash [EI/L²]
 
@@ -128,7 +128,7 @@ class NewtonController:
 
         if full <= 1 and abs(lacks(full)) <= CLOSER * abs(missing):
             return moves
-        return along * closest(lacks, missing, float(((high - low) / increments).max()))
+        return along * closest(lacks, float(((high - low) / increments).max()))
 
     def _estimated(self, observation: Observation, state: PrivilegedState) -> PrivilegedState:
         """Return the state with every hidden quantity replaced by its estimate."""
@@ -154,16 +154,16 @@ class NewtonController:
         return np.asarray((there - here) / steps[:, None] * (size / max(float(np.linalg.norm(here)), REACHED)))
 
 
-def closest(lacks: Callable[[float], float], here: float, farthest: float) -> float:
+def closest(lacks: Callable[[float], float], farthest: float) -> float:
     """Return the number of full actions after which the least force is missing, the nearest zero if there is one.
 
     A sign that changes in a jump, as where the robot slips off, is no zero.
 
     Args:
         lacks: The force that is missing after a number of actions, of either sign.
-        here: The same now.
         farthest: Number of actions that are tried, either way.
     """
+    here = lacks(0.0)
     tried, last = [(abs(here), 0.0)], {1.0: here, -1.0: here}
     for step in range(math.ceil(farthest)):
         for way, before in last.items():
@@ -171,19 +171,8 @@ def closest(lacks: Callable[[float], float], here: float, farthest: float) -> fl
             last[way] = missing = lacks(outer)
             tried.append((abs(missing), outer))
             if missing * before <= 0:
-                zero = _zero(lacks, way * step, outer, missing)
+                zero = bisect(lacks, way * step, outer)
                 if abs(left := lacks(zero)) <= CLOSER * abs(here):
                     return zero
                 tried.append((abs(left), zero))
     return min(tried, key=lambda pair: pair[0])[1]  # of equals the first, which is to stay
-
-
-def _zero(lacks: Callable[[float], float], inner: float, outer: float, beyond: float) -> float:
-    """Return where a sign changes between two numbers of actions, by bisection."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (inner + outer)
-        if lacks(middle) * beyond > 0:
-            outer = middle
-        else:
-            inner = middle
-    return outer

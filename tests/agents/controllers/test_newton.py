@@ -34,11 +34,11 @@ def test_the_oracle_alternates_neither_across_kinks_nor_around_a_least_force(see
 
 
 def test_a_search_finds_the_nearest_zero_or_what_misses_least():
-    assert closest(lambda x: (x - 2.25) * (x + 5.5), -12.375, 10) == pytest.approx(2.25, abs=1e-9)
-    assert closest(lambda x: (x - 7.0) * (x + 1.5), -10.5, 10) == pytest.approx(-1.5, abs=1e-9)
-    assert closest(lambda x: 1 + (x - 3) ** 2, 10, 10) == 3
-    assert closest(lambda x: 1 + x**2, 1, 10) == 0
-    assert closest(lambda x: 1.0 if x < 1.5 else -4.0, 1, 10) == 0  # a jump is no zero
+    assert closest(lambda x: (x - 2.25) * (x + 5.5), 10) == pytest.approx(2.25, abs=1e-9)
+    assert closest(lambda x: (x - 7.0) * (x + 1.5), 10) == pytest.approx(-1.5, abs=1e-9)
+    assert closest(lambda x: 1 + (x - 3) ** 2, 10) == 3
+    assert closest(lambda x: 1 + x**2, 10) == 0
+    assert closest(lambda x: 1.0 if x < 1.5 else -4.0, 10) == 0  # a jump is no zero
 
 
 def test_it_needs_its_environment():
