@@ -1,8 +1,11 @@
 """Newton steps on the exact model, and the oracle: an upper bound that sees every hidden quantity."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.optimize import bisect
 
 from agents.arguments import check_real
 from agents.environment import Environment, require_entries, require_env
@@ -11,6 +14,7 @@ from agents.policy import Observation, motor_actions, natural, search, set_point
 from agents.tuned import NEWTON_GAIN
 from ccr_gym import ActionSpec, PrivilegedState, Scales
 
+CLOSER = 0.5  # share of the missing force that a Newton step may leave
 PROBE = 1e-4  # trial move of a finite difference [a]
 REACHED = 1e-9  # force error that is roundoff, for which no motor crosses its backlash [EI/L²]
 
@@ -21,8 +25,9 @@ class NewtonController:
 
     It knows the model, the scene and the state of the robot, which policies do not see, but neither rigidity nor
     backlash: these are what :class:`agents.estimation.robot.RobotEstimator` knows of them. The oracle sees all of
-    these, the true force and the next set-point: it is an upper bound, not a competitor. Of several actions it
-    makes the smallest increments that reach the set-point, or come closest to a vector.
+    these, the true force and the next set-point: it is an upper bound, not a competitor, and with one action it
+    searches where a Newton step does not bring a magnitude closer. Of several actions both make the smallest
+    increments that reach the set-point, or come closest to a vector.
 
     Attributes:
         oracle: Whether it sees every hidden quantity.
@@ -83,6 +88,8 @@ class NewtonController:
         missing = np.where(np.abs(missing) < REACHED, 0.0, missing)
         increments = self._actions.increment_mm / scales.travel_mm
         moves = self.gain * self._step(slopes, missing, state, scales)
+        if self.oracle and moves.size == missing.size == 1 and missing.any():
+            moves = self._guarded(moves, float(missing[0]), state, scales)
         return motor_actions(moves, state, increments)
 
     def _step(self, slopes: np.ndarray, missing: np.ndarray, state: PrivilegedState, scales: Scales) -> np.ndarray:
@@ -98,6 +105,30 @@ class NewtonController:
             free &= np.where(increments > 0, below, above)
             slopes = slopes * free[:, None]
         return np.asarray(increments)
+
+    def _guarded(self, moves: np.ndarray, missing: float, state: PrivilegedState, scales: Scales) -> np.ndarray:
+        """Return the moves of a Newton step that halves the missing magnitude, else those to the nearest set-point.
+
+        The force has a kink where another node takes the contact, and stops growing with the cable in places. Newton
+        steps can alternate between the sides of a kink, or around a least force above the set-point. The nearest place
+        on their line where the force is the set-point stays the nearest on the way there.
+        """
+        travel, increments = scales.travel_mm, self._actions.increment_mm / scales.travel_mm
+        low, high = self._actions.low_mm / travel, self._actions.high_mm / travel
+        full = float(np.abs(moves / increments).max())
+        if full == 0:
+            return moves
+        along, probe = moves / full, self._env.get_wrapper_attr("probe")
+        here = float(np.linalg.norm(probe(state.actuated_mm * travel)))
+        factor = float(np.linalg.norm(state.force)) / max(here, REACHED)
+
+        def lacks(actions: float) -> float:
+            force = probe(np.clip(state.actuated_mm + actions * along, low, high) * travel)
+            return float(state.goal - factor * np.linalg.norm(force))
+
+        if full <= 1 and abs(lacks(full)) <= CLOSER * abs(missing):
+            return moves
+        return along * closest(lacks, float(((high - low) / increments).max()))
 
     def _estimated(self, observation: Observation, state: PrivilegedState) -> PrivilegedState:
         """Return the state with every hidden quantity replaced by its estimate."""
@@ -121,3 +152,27 @@ class NewtonController:
         here = probe(actuated * scales.travel_mm)
         there = np.array([probe(places * scales.travel_mm) for places in actuated + np.diag(steps)])
         return np.asarray((there - here) / steps[:, None] * (size / max(float(np.linalg.norm(here)), REACHED)))
+
+
+def closest(lacks: Callable[[float], float], farthest: float) -> float:
+    """Return the number of full actions after which the least force is missing, the nearest zero if there is one.
+
+    A sign that changes in a jump, as where the robot slips off, is no zero.
+
+    Args:
+        lacks: The force that is missing after a number of actions, of either sign.
+        farthest: Number of actions that are tried, either way.
+    """
+    here = lacks(0.0)
+    tried, last = [(abs(here), 0.0)], {1.0: here, -1.0: here}
+    for step in range(math.ceil(farthest)):
+        for way, before in last.items():
+            outer = way * (step + 1)
+            last[way] = missing = lacks(outer)
+            tried.append((abs(missing), outer))
+            if missing * before <= 0:
+                zero = bisect(lacks, way * step, outer)
+                if abs(left := lacks(zero)) <= CLOSER * abs(here):
+                    return zero
+                tried.append((abs(left), zero))
+    return min(tried, key=lambda pair: pair[0])[1]  # of equals the first, which is to stay
