@@ -171,7 +171,7 @@ def closest(lacks: Callable[[float], float], farthest: float) -> float:
             last[way] = missing = lacks(outer)
             tried.append((abs(missing), outer))
             if missing * before <= 0:
-                zero = bisect(lacks, way * step, outer)
+                zero = float(bisect(lacks, way * step, outer))
                 if abs(left := lacks(zero)) <= CLOSER * abs(here):
                     return zero
                 tried.append((abs(left), zero))
