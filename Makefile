@@ -76,7 +76,7 @@ readme:  ## the README as printed, on a fresh clone of the last commit; README="
 
 $(INSTALL): pyproject.toml constraints.txt $(KERNEL_SOURCES)
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	PIP_NO_COMPILE=1 $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
 clients: $(CLIENTS:%=build/clients/%/.installed)  ## what learns on these environments, in a virtual environment for each group of pins

@@ -10,7 +10,7 @@ from ccr_gym.rendering.frame import Frame
 from ccr_gym.rendering.marks import taut
 from ccr_gym.rendering.page import Region
 from ccr_gym.rendering.palette import LAYOUT, PALETTE, Color
-from ccr_gym.rendering.units import force_unit, round_ticks
+from ccr_gym.rendering.units import force_unit, round_ticks, short
 
 TICKS = 6
 ROW = 20.0
@@ -91,7 +91,7 @@ def draw_tensions(canvas: Canvas, frame: Frame, region: Region) -> None:
         height, width = max(bars.height * _part(tension, full), 1.5), min(0.7 * step, 18.0)
         left = bars.left + (index + 0.5) * step - 0.5 * width
         canvas.box(left, bars.bottom - height, width, height, PALETTE.cable if tight else PALETTE.slack)
-    ends = ((bars.bottom, "0"), (bars.top, f"{full * unit.per_newton:.3g}"))
+    ends = ((bars.bottom, "0"), (bars.top, short(full * unit.per_newton)))
     for y, text in ends:
         canvas.box(bars.left - 5, y - 0.5, 5, 1, PALETTE.muted)
         canvas.label(text, (bars.left - 8, y), PALETTE.muted, 1, LAYOUT.small_font)

@@ -48,6 +48,11 @@ def decimals(resolution: float) -> int:
     return min(max(0, math.ceil(-math.log10(resolution) - SLACK)), 9)
 
 
+def short(number: float) -> str:
+    """Return a number with three significant digits, and without an exponent."""
+    return np.format_float_positional(number, 3, fractional=False, trim="-")
+
+
 def signed(text: str) -> str:
     """Return the text of a number with a proper minus sign, none for a rounded zero."""
     if text.startswith("-") and not text.strip("-0."):
@@ -64,7 +69,7 @@ def length_text(length_mm: float, resolution_mm: float | None = None, unit: bool
         unit: Whether the unit follows.
     """
     if resolution_mm is None:
-        number = signed(f"{length_mm:.3g}" if 1e-3 <= abs(length_mm) < 1e5 or not length_mm else f"{length_mm:.2e}")
+        number = signed(short(length_mm) if 1e-3 <= abs(length_mm) < 1e5 or not length_mm else f"{length_mm:.2e}")
     else:
         number = signed(f"{length_mm:.{decimals(resolution_mm)}f}")
     return f"{number} mm" if unit else number

@@ -174,7 +174,7 @@ def test_scaled_robot_gives_the_same_pixels_but_for_the_lengths_written(
 
 
 @pytest.mark.parametrize(
-    ("length_mm", "text"), [(18, "18 mm"), (100, "100 mm"), (0.3, "0.3 mm"), (-2.5, "−2.5 mm"), (1e-5, "1.00e−05 mm")]
+    ("length_mm", "text"), [(18, "18 mm"), (1800, "1800 mm"), (0.3, "0.3 mm"), (-2.5, "−2.5 mm"), (1e-5, "1.00e−05 mm")]
 )
 def test_lengths_are_written_with_digits_for_their_size(length_mm: float, text: str) -> None:
     assert length_text(length_mm) == text
