@@ -97,9 +97,21 @@ def test_videos_show_the_scene_where_policies_differ_most_of_those_where_the_bes
     assert suite.telling_scene([result([1.0, 2.0], [0, 0]), result([9.0, 3.0], [0, 0])]) == 0
 
 
-@pytest.mark.parametrize(("steps", "shown"), [(64.0, "64"), (64.5, "never"), (65.0, "never")])
-def test_what_does_not_settle_never_does(steps, shown):
-    assert report.COLUMNS["settled [step]"]({"settling_step": steps, "steps": 64}) == shown
+@pytest.mark.parametrize(
+    ("steps", "settled", "shown"), [(64.0, 0.6, "64"), (64.0, 0.5, "never"), (64.5, 0.5, "never"), (65.0, 0.4, "never")]
+)
+def test_what_does_not_settle_never_does(steps, settled, shown):
+    summary = {"settling_step": steps, "steps": 64, "success": settled}
+    assert report.COLUMNS["settled [step]"](summary) == shown
+
+
+@pytest.mark.parametrize(
+    ("steps", "median"), [([63, 63, 65, 65], 65), ([10, 20, 65, 65], 65), ([10, 20, 30, 65], 25), ([10, 65, 65], 65)]
+)
+def test_episodes_that_do_not_settle_count_as_infinite(steps, median):
+    metrics = {name: np.ones((1, len(steps))) for name in METRICS}
+    metrics |= {"settling_step": np.array([steps], float), "success": np.array([steps]) <= 64}
+    assert suite.summarize(metrics)["settling_step"] == median
 
 
 def test_printed_tables_fit_80_columns_and_leave_out_what_is_empty(capsys):
