@@ -85,7 +85,10 @@ def write(results: list[Result], config: EvaluateConfig) -> None:
     values = report | {"results": [result.as_dict() for result in results]}
     write_text(config.out / "evaluation.json", json.dumps(values) + "\n")
     first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
-    write_text(config.out / "scores.json", json.dumps(first) + "\n")
+    if first:
+        write_text(config.out / "scores.json", json.dumps(first) + "\n")
+    else:  # nothing to compare trained policies by, nor from an earlier evaluation
+        (config.out / "scores.json").unlink(missing_ok=True)
     by_id = group(results)
     notes = "\n".join(f"- {note}" for note in notes_on(by_id))
     write_text(config.out / "evaluation.md", f"{matrix(by_id)}\n{markdown(by_id)}\n{notes}\n")
