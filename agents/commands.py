@@ -20,6 +20,7 @@ from agents.config import (
     TrainConfig,
 )
 from agents.errors import UserError
+from agents.tuned import played_steps, round_steps
 from ccr_gym import __version__
 
 ABOUT = "Train, evaluate and compare policies; --version prints the version."
@@ -89,8 +90,12 @@ def train(config: TrainConfig) -> None:
     if training.is_finished(config):
         print(f"{config.run} is already finished; --restart trains it again from the beginning")
         return
+    steps = played_steps(config.learner)
+    if steps != config.learner.steps:
+        rounds = f"whole rounds of {round_steps(config.learner):,}"
+        print(f"Training plays {steps:,} steps, {rounds}, where --steps asks for {config.learner.steps:,}", flush=True)
     folder = training.train(config)
-    print(f"Trained {config.learner.name} for {config.learner.steps} steps on {config.env_id}; saved to {folder}")
+    print(f"Trained {config.learner.name} for {steps:,} steps on {config.env_id}; saved to {folder}")
 
 
 def evaluate(config: EvaluateConfig) -> None:
@@ -146,12 +151,18 @@ def estimate(config: EstimateConfig) -> None:
 
     found = run(config)
     known, scales, largest = found.known[-1], found.scales, int(found.force_n.argmax())
-    print(f"Rigidity: {known.rigidity:.3g} ± {known.rigidity_std:.2g} times that of {config.robot}")
-    print(f"Loss of tension to friction: {known.loss:.3f} ± {known.loss_std:.2g}")
+    end = {
+        name: " (at the end of its range)" if name in found.warnings else "" for name in ("rigidity", "loss", "play")
+    }
+    print(f"Rigidity: {known.rigidity:.3g} ± {known.rigidity_std:.2g} times that of {config.robot}{end['rigidity']}")
+    print(f"Loss of tension to friction: {known.loss:.3f} ± {known.loss_std:.2g}{end['loss']}")
     backlash, deviation = (2 * scales.travel_mm * value for value in (known.half_backlash, known.half_backlash_std))
-    print(f"Play between motor and cable: {backlash:.3g} ± {deviation:.2g} mm")
-    row, force, spread = found.log.rows[largest], found.force_n[largest], found.force_std_n[largest]
-    print(f"Largest contact force: {force:.3g} ± {spread:.2g} N, in row {row}")
+    print(f"Play between motor and cable: {backlash:.3g} ± {deviation:.2g} mm{end['play']}")
+    line, force, spread = found.log.rows[largest], found.force_n[largest], found.force_std_n[largest]
+    at = f"{force:.3g} ± {spread:.2g} N, in line {line} of {config.log}" if force > 0 else "no contact"
+    print(f"Largest contact force: {at}")
+    for warning in found.warnings.values():
+        print(f"ccr-gym: warning: {warning}", file=sys.stderr)
     print(f"Written: {config.out}/estimate.csv, shape.csv, estimate.json and estimate.png")
 
 

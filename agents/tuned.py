@@ -222,6 +222,21 @@ def sensing_of(env_id: str) -> Literal["ideal", "realistic"]:
     return "ideal" if "-Paper-" in env_id else "realistic"
 
 
+def round_steps(learner: LearnerSettings) -> int:
+    """Return the environment steps after which a learner learns."""
+    return learner.envs if isinstance(learner, SACSettings) else learner.envs * learner.rollout
+
+
+def played_steps(learner: LearnerSettings) -> int:
+    """Return the environment steps that a training plays, whole rounds.
+
+    The last round may exceed ``steps``; distilling leaves out one that would, but plays one at least.
+    """
+    count = round_steps(learner)
+    rounds = learner.steps // count if isinstance(learner, DistilledSettings) else -(-learner.steps // count)
+    return max(rounds, 1) * count
+
+
 def learner_settings(learner: str, sensing: str) -> LearnerSettings:
     """Return the settings that a learner is trained with by default."""
     return PPO_IDEAL if (learner, sensing) == (PPOSettings.name, "ideal") else LEARNERS[learner]()

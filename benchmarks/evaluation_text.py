@@ -10,7 +10,7 @@ from benchmarks.markdown import line, rule
 HONEST = ("P", "PI", "MPC", "Harmonic", "PPO", "Distilled")  # policies that see what agents see
 IN_SHORT = ("PI", "MPC", "PPO", "Distilled", "Oracle")
 JUDGED = ("Distilled", "PPO", "MPC", "Harmonic")
-MANY = 0.01  # share of steps
+MANY, LEAST = 0.01, 0.0001  # shares of steps: named one by one above, and the least that two digits show
 HEADROOM = ("P", "PI", "MPC", "Harmonic", "Newton", "Oracle")
 NAMES = {
     "latency": "latency",
@@ -98,28 +98,59 @@ def events(evaluation: Found) -> str:
         for statuses in [r["summary"]["statuses"]]
     }
     few = {key: share for key, share in shares.items() if share <= MANY}
-    plane, space = (max(few[key] for key in few if ("Spatial" in key[1]) == where) for where in (False, True))
+    most = (max(few[key] for key in few if ("Spatial" in key[1]) == where) for where in (False, True))
+    plane, space = (f"at most {max(share, LEAST):.2%}" if share else "none" for share in most)
     many = [f"{policy} on `{env_id}` ({share:.0%})" for (policy, env_id), share in shares.items() if share > MANY]
-    text = f"At most {plane:.2%} of the steps in the plane and {space:.2%} in space snap, stall or are blocked"
+    text = f"Of the steps in the plane {plane}, of those in space {space} snap, stall or are blocked"
     exceptions = f", but for {' and '.join(many)}" if many else ""
     return f"{text}{exceptions}.".replace("%", " %")
 
 
 def headroom_table(rows: Sequence[Found]) -> str:
-    """Return the table of headroom."""
-    lines = [line("id", "sensing", "set-point", *HEADROOM, "best, of the set-point", "room")]
-    lines.append(rule(len(HEADROOM) + 5))
+    """Return the tables of headroom, one for each sensing, with the least error of an honest controller in bold."""
+    return "\n\n".join(_headroom_of(sensing, here) for sensing, here in _by("sensing", rows).items())
+
+
+def _headroom_of(sensing: str, rows: Sequence[Found]) -> str:
+    lines = [f'`sensing="{sensing}"`:', ""]
+    lines += [line("id", "set-point", *HEADROOM, "best, of the set-point", "room"), rule(len(HEADROOM) + 4)]
     for row in rows:
-        errors = ("{:.1f} [{:.1f}, {:.1f}]".format(*row["errors"][p]) if p in row["errors"] else "" for p in HEADROOM)
+        errors = (_with_interval(row, policy) for policy in HEADROOM)
         name, share = f"`{row['id'][4:-3]}`", f"{row['best'] / row['set_point']:.1%}".replace("%", " %")
-        room = "yes" if row["room"] else "no"
-        lines.append(line(name, row["sensing"], f"{row['set_point']:.0f}", *errors, share, room))
+        lines.append(line(name, f"{row['set_point']:.0f}", *errors, share, "yes" if row["room"] else "no"))
     return "\n".join(lines)
 
 
+def _with_interval(row: Found, policy: str) -> str:
+    if policy not in row["errors"]:
+        return ""
+    error, low, high = row["errors"][policy]
+    text = f"{error:.1f} [{low:.1f}, {high:.1f}]"
+    return f"**{text}**" if policy in HONEST and error == row["best"] else text
+
+
+def _by(name: str, rows: Sequence[Found]) -> dict[str, list[Found]]:
+    """Return rows by one of their entries."""
+    found: dict[str, list[Found]] = {}
+    for row in rows:
+        found.setdefault(row[name], []).append(row)
+    return found
+
+
 def knowledge_table(rows: Sequence[Found]) -> str:
-    """Return the table of what the estimator knows."""
-    lines = [line("id", "sensing", "step", *NAMES.values()), "| --- " * (len(NAMES) + 3) + "|"]
+    """Return the table of what the estimator knows at the end of episodes, and of each environment one to unfold."""
+    last = {(row["id"], row["sensing"]): row for row in rows}  # steps ascend
+    head = ("sensing", "step", *NAMES.values())
+    lines = [line("id", *head), rule(len(head) + 1)]
+    lines += [line(f"`{row['id']}`", *_known(row)) for row in last.values()]
+    for env_id, here in _by("id", rows).items():
+        lines += ["", f"<details><summary>{env_id}, step by step</summary>", "", line(*head), rule(len(head))]
+        lines += [*(line(*_known(row)) for row in here), "", "</details>"]
+    return "\n".join(lines)
+
+
+def _known(row: Found) -> list[str]:
+    """Return the cells of a row: sensing, step, and median errors with their coverage."""
     forms = {
         "latency": "{:.0%} wrong",
         "half_backlash": "{:.4f}",
@@ -127,13 +158,8 @@ def knowledge_table(rows: Sequence[Found]) -> str:
         "rigidity": "{:.1%}",
         "force": "{:.1%}",
     }
-    for row in rows:
-        cells = [
-            (f"{forms[name].format(row[name][0])} ({100 * row[name][1]:.0f})" if name in row else "").replace("%", " %")
-            for name in NAMES
-        ]
-        lines.append(line(f"`{row['id']}`", row["sensing"], row["step"], *cells))
-    return "\n".join(lines)
+    found = (f"{forms[name].format(row[name][0])} ({100 * row[name][1]:.0f})" if name in row else "" for name in NAMES)
+    return [row["sensing"], str(row["step"]), *(text.replace("%", " %") for text in found)]
 
 
 def cost_table(rows: Sequence[Found]) -> str:

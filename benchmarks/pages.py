@@ -34,8 +34,14 @@ def save(name: str, values: object) -> None:
 
 
 def take_evaluation(path: Path) -> None:
-    """Keep the summaries of an evaluation, without its episodes."""
+    """Keep the summaries of an evaluation, without its episodes.
+
+    Raises:
+        SystemExit: If the file is no evaluation, or one of no policy.
+    """
     found = json.loads(path.read_text())
+    if not (isinstance(found, dict) and found.get("results")):
+        sys.exit(f"{path} holds no results of policies: give the evaluation.json that ccr-gym evaluate writes")
     kept = [{key: result[key] for key in ("policy", "env_id", "sensing", "summary")} for result in found["results"]]
     save("evaluation", {**found, "results": [_rounded(result) for result in kept]})
 

@@ -9,7 +9,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))  # last, so that an installed package goes first
 
-from benchmarks import markdown, pages, speed_text
+from benchmarks import evaluation_text, markdown, pages, speed_text
 
 
 @pytest.mark.parametrize("page", pages.PAGES, ids=lambda page: page.name)
@@ -39,6 +39,28 @@ def test_a_benchmark_without_what_the_docs_compare_with_is_not_taken(tmp_path, m
     with pytest.raises(SystemExit, match="pip install mujoco"):
         pages.take_bench(path)
     assert not (tmp_path / "bench.json").exists()
+
+
+@pytest.mark.parametrize("text", ["{}", '{"PPO CCR/LoadCell-v1": [1.0]}', '{"results": []}', "[]"])
+def test_a_file_that_is_no_evaluation_is_not_taken(text, tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "RESULTS", tmp_path)
+    path = tmp_path / "scores.json"
+    path.write_text(text)
+    with pytest.raises(SystemExit, match=r"scores\.json holds no results of policies: give the evaluation\.json"):
+        pages.take_evaluation(path)
+    assert not (tmp_path / "evaluation.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("shares", "text"), [((0, 3), "none, of those in space at most 0.30 %"), ((0.001, 0), "0.01 %")]
+)
+def test_no_event_is_called_none(shares, text):
+    ids = "CCR/LoadCell-v1", "CCR/SpatialPush-v1"
+    rows = [
+        {"policy": "PI", "env_id": env_id, "summary": {"statuses": {"CONVERGED": 1000 - share, "STALLED": share}}}
+        for env_id, share in zip(ids, shares, strict=True)
+    ]
+    assert text in evaluation_text.events({"results": rows})
 
 
 def test_each_time_is_named_after_its_model():

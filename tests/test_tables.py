@@ -11,7 +11,7 @@ from agents.config import PRETRAINED
 from agents.learning.pretrained import SUFFIX, folder_name
 from agents.tuned import sensing_of
 from benchmarks import pages, tables
-from benchmarks.evaluation_text import headroom_table
+from benchmarks.evaluation_text import headroom_table, knowledge_table
 
 
 def test_the_table_of_headroom():
@@ -24,8 +24,27 @@ def test_the_table_of_headroom():
         "best": 10.0,
         "room": True,
     }
-    text = headroom_table([row]).splitlines()[-1]
-    assert text == ("| `LoadCell` | realistic | 119 |  |  | 10.0 [9.0, 12.0] |  |  | 0.0 [0.0, 0.1] | 8.4 % | yes |")
+    lines = headroom_table([row, {**row, "sensing": "sensorless"}]).splitlines()
+    text = "| `LoadCell` | 119 |  |  | **10.0 [9.0, 12.0]** |  |  | 0.0 [0.0, 0.1] | 8.4 % | yes |"
+    assert [line for line in lines if "LoadCell" in line] == [text, text]
+    assert [line for line in lines if "sensing=" in line] == ['`sensing="realistic"`:', '`sensing="sensorless"`:']
+
+
+def test_the_table_of_knowledge_shows_the_last_step_and_folds_the_others():
+    rows = [
+        {"id": env_id, "sensing": sensing, "step": step, "loss": [0.01, 0.987]}
+        for env_id in ("CCR/LoadCell-v1", "CCR/TrackForce-v1")
+        for sensing in ("realistic", "sensorless")
+        for step in (8, 64)
+    ]
+    shown, *folded = knowledge_table(rows).split("<details>")
+    assert shown.count("| 64 |") == 4
+    assert "| 8 |" not in shown
+    assert len(folded) == 2
+    for part, env_id in zip(folded, ("CCR/LoadCell-v1", "CCR/TrackForce-v1"), strict=True):
+        assert part.startswith(f"<summary>{env_id}, step by step</summary>\n\n| sensing | step |")
+        assert part.count("| 8 |  |  | 0.0100 (99) |  |  |") == part.count("| 64 |  |  | 0.0100 (99) |  |  |") == 2
+        assert part.rstrip().endswith("\n\n</details>")
 
 
 def test_the_docs_show_what_the_probe_tells(tmp_path, monkeypatch):

@@ -20,6 +20,7 @@ from solver.spatial import SpatialEquilibrium
 
 FORCE, ESTIMATE, GOAL = "C0", "C1", "0.3"
 COLUMNS = 4
+NARROW = 0.02  # intervals that cannot be seen, over the largest error of the axes: they get a diamond
 
 
 def draw_episodes(episodes: dict[str, tuple[Episode, ...]], path: Path) -> None:
@@ -59,10 +60,13 @@ def draw_scores(summaries: dict[str, dict[str, JsonObject]], out: Path) -> None:
     """Draw the interquartile means of the force error with their intervals, on axes for each environment."""
     figure, axes = _grid(len(summaries))
     for axis, (env_id, policies) in zip(axes, summaries.items(), strict=False):
+        largest = max(summary["rmse_interval_mn"][1] for summary in policies.values())
         for row, (name, summary) in enumerate(policies.items()):
             middle, (low, high) = summary["rmse_iqm_mn"], summary["rmse_interval_mn"]
             axis.barh(row, high - low, left=low, color=_color(name), alpha=0.6)
             axis.plot([middle, middle], [row - 0.4, row + 0.4], color="k", lw=1.5)
+            if high - low <= NARROW * largest:
+                axis.plot(middle, row, "D", color=_color(name), mec="k", ms=6, clip_on=False, zorder=5)
         axis.set_yticks(range(len(policies)), list(policies), fontsize=8)
         axis.set(title=env_id, xlabel="force error [mN]", xlim=(0, None))
         axis.invert_yaxis()

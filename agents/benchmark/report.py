@@ -30,7 +30,7 @@ COLUMNS: dict[str, Callable[[JsonObject], str]] = {  # heading of a column, and 
     "worst tenth [mN]": lambda s: f"{s['rmse_cvar_mn']:.1f}",
     "steady [mN]": lambda s: f"{s['steady_mn']:.2f}",
     "within 5 %": lambda s: f"{s['success']:.0%}",
-    "settled [step]": lambda s: f"{s['settling_step']:.0f}" if s["settling_step"] <= s["steps"] else "never",
+    "settled [step]": lambda s: f"{s['settling_step']:.0f}" if _settles(s) else "never",
     "overshoot": lambda s: f"{s['overshoot']:.0%}",
     "contact lost [times]": lambda s: f"{s['contact_losses']:.2f}",
     "peak [mN]": lambda s: f"{s['peak_mn']:.0f}",
@@ -60,7 +60,8 @@ NOTES = {  # what is below a heading
     "worst tenth [mN]": "mean of that root mean square over the worst tenth of the episodes",
     "steady [mN]": f"mean error of the last {STEADY} steps",
     "within 5 %": "share of the episodes that end within 5 % of the set-point",
-    "settled [step]": "step from which on the error stays within 5 %, median of the episodes",
+    "settled [step]": "step from which on the error stays within 5 %, median of the episodes, of which those that do "
+    "not settle count as infinite: never where no more than half of them settle",
     "overshoot": "how far the largest force is above the set-point, median of the episodes",
     "contact lost [times]": "how often an episode loses contact",
     "peak [mN]": "largest force, mean of the episodes",
@@ -73,13 +74,21 @@ NOTES = {  # what is below a heading
 Grouped = dict[str, list[Result]]  # results by environment
 
 
+def _settles(summary: JsonObject) -> bool:
+    """Return whether more than half of the episodes settle: those are the ones that end within 5 %."""
+    return bool(summary["settling_step"] <= summary["steps"] and summary["success"] > 0.5)
+
+
 def write(results: list[Result], config: EvaluateConfig) -> None:
     """Write results, tables, figures and model cards into the folder of an evaluation, and print the tables."""
     report = {"episodes": config.episodes, "seed": config.seed, "split": "test"}
     values = report | {"results": [result.as_dict() for result in results]}
     write_text(config.out / "evaluation.json", json.dumps(values) + "\n")
     first = {f"{r.entry.policy} {r.entry.env_id}": np.round(r.rmse[0], 4).tolist() for r in results if r.entry.files}
-    write_text(config.out / "scores.json", json.dumps(first) + "\n")
+    if first:
+        write_text(config.out / "scores.json", json.dumps(first) + "\n")
+    else:  # nothing to compare trained policies by, nor from an earlier evaluation
+        (config.out / "scores.json").unlink(missing_ok=True)
     by_id = group(results)
     notes = "\n".join(f"- {note}" for note in notes_on(by_id))
     write_text(config.out / "evaluation.md", f"{matrix(by_id)}\n{markdown(by_id)}\n{notes}\n")

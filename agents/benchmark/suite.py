@@ -95,13 +95,18 @@ def summarize(metrics: dict[str, np.ndarray]) -> JsonObject:
     rmse = metrics["rmse_mn"]
     return {
         **{name: float(values.mean()) for name, values in metrics.items()},
-        "settling_step": float(np.median(metrics["settling_step"])),
+        "settling_step": _median_settling(metrics["settling_step"], metrics["success"] > 0),
         "overshoot": float(np.median(metrics["overshoot"])),
         "rmse_iqm_mn": float(iqm(rmse.ravel())),
         "rmse_interval_mn": iqm_interval(rmse),
         "rmse_of_seeds_mn": [float(iqm(row)) for row in rmse],
         "rmse_cvar_mn": cvar(rmse.ravel()),
     }
+
+
+def _median_settling(steps: np.ndarray, settled: np.ndarray) -> float:
+    """Return the median step, as of an episode that does not settle if no more than half of them settle."""
+    return float(min(np.median(np.where(settled, steps, np.inf)), steps.max()))
 
 
 def entries(config: EvaluateConfig) -> list[Entry]:

@@ -32,7 +32,7 @@ from agents.learning.checks import (
 )
 from agents.learning.learners import WARM_UP
 from agents.learning.tensors import Tensors, read_tensors, write_tensors
-from agents.tuned import DistilledSettings, LearnerSettings, SACSettings
+from agents.tuned import DistilledSettings, LearnerSettings, SACSettings, round_steps
 
 CHECKPOINT = "checkpoint.safetensors"
 CHECKPOINTS = 20  # per run, at most
@@ -152,7 +152,7 @@ def _progress(values: JsonObject, learner: LearnerSettings) -> Progress:
         Exception: Of any kind, if a run with these settings cannot have made it.
     """
     check_names(values, Progress.__slots__)
-    round_ = _round(learner)
+    round_ = round_steps(learner)
     steps = check_whole("steps", values["steps"], round_, max(learner.steps, round_))
     if steps % round_:
         raise ValueError(f"steps is {steps}; it must be a multiple of {round_}, after which the learner learns")
@@ -166,7 +166,7 @@ def _counters(values: JsonObject, learner: LearnerSettings, steps: int) -> dict[
     Raises:
         Exception: Of any kind, if they are not those of a learner after these steps.
     """
-    rounds, counters = steps // _round(learner), {}
+    rounds, counters = steps // round_steps(learner), {}
     if isinstance(learner, SACSettings):
         size = max(learner.buffer // learner.envs, 1)
         counters = {"position": rounds % size, "full": int(rounds >= size)}
@@ -178,11 +178,6 @@ def _counters(values: JsonObject, learner: LearnerSettings, steps: int) -> dict[
         if type(values[name]) is not int or values[name] != value:
             raise ValueError(f"{name} is {values[name]!r:.80}; after {steps} steps it must be {value}")
     return counters
-
-
-def _round(learner: LearnerSettings) -> int:
-    """Return the environment steps after which a learner learns."""
-    return learner.envs if isinstance(learner, SACSettings) else learner.envs * learner.rollout
 
 
 def _resumed_seed(config: TrainConfig, steps: int) -> int:

@@ -1,6 +1,7 @@
 """The controls of one environment: who drives, set-point, cables, sizes of obstacles, buttons."""
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 import viser
@@ -15,48 +16,70 @@ KEYS: tuple[tuple[Key, Key], ...] = (("K", "J"), ("L", "H"), ("O", "U"), ("P", "
 ARROWS = "Arrows: the force of the robot on the obstacle, **green** the true one, **orange** its estimate."
 RECORD, STOP_RECORDING = "Record a GIF", "Stop recording"
 MILLI = 1e3
+MOST_SLIDERS = 1000  # of cables and obstacles, all of which are between the set-point and the buttons
+
+Slider: TypeAlias = viser.GuiSliderHandle[float]
 
 
 class Controls:
-    """Controls in the part of the page that is open; another environment has controls of its own.
+    """Controls in the part of the page that is open, which are fitted to each environment.
+
+    None is ever removed: a browser that is late applies removals before the updates that were sent ahead of them, and
+    reports each as an error. What an environment has no use for is hidden.
 
     Args:
         gui: Where they are added.
         session: What they control.
         inputs: What users do goes there.
         record: Called when a user presses the button of recordings.
-        recording: Whether a recording is under way.
     """
 
-    def __init__(
-        self, gui: viser.GuiApi, session: Session, inputs: Inputs, record: Callable[[], None], recording: bool
-    ) -> None:
+    def __init__(self, gui: viser.GuiApi, session: Session, inputs: Inputs, record: Callable[[], None]) -> None:
         self._gui, self._session, self._inputs = gui, session, inputs
         self._driver = gui.add_dropdown("Driver", drivers(session.choices.env_id), initial_value=session.choices.driver)
-        self._desired = self._add_desired()
-        self._cables = self._add_cables()
-        self._sizes = self._add_sizes()
+        self._desired = self._add_slider(lambda value: session.desire(value / MILLI))
+        self._cables: list[Slider] = []
+        self._sizes: list[Slider] = []
         self._buttons = gui.add_button_group("Scene", ("New", "Straighten", "Pause"))
         self._episodes = gui.add_checkbox("New scene after each episode", session.episodes)
         self._gif = gui.add_button("")
-        self._hints = gui.add_markdown(
-            f"{ARROWS} Drag obstacles by their handles. Keys: {'; '.join(self._key_hints())}"
-        )
-        self.show_recording(recording)
+        self._hints = gui.add_markdown("")
+        self.show_recording(False)
+        self.fit()
         inputs.on_value(self._driver, lambda value: session.choose("driver", value))
         inputs.on_choice(self._buttons, self._press)
         inputs.on_value(self._episodes, lambda value: setattr(session, "episodes", value))
         inputs.on_click(self._gif, record)
+
+    def fit(self) -> None:
+        """Fit them to the session's environment, in the part of the page where they were added."""
+        session, spec = self._session, self._session.env.action_spec
+        self._driver.options = drivers(session.choices.env_id)
+        _set_range(self._desired, "Set-point [mN]", *(MILLI * bound for bound in session.force_range))
+        for index in range(len(self._cables), spec.size):
+            self._cables.append(self._add_cable(index))
+        for index, slider in enumerate(self._cables):
+            slider.visible = index < spec.size
+            if slider.visible:
+                label = f"Cable {index + 1} [mm]" if index < spec.commands else "Length [mm]"
+                _set_range(slider, label, float(spec.low_mm[index]), float(spec.high_mm[index]))
+        have_size = [bool(obstacle.size_fields) for obstacle in session.equilibrium.scene]
+        for index in range(len(self._sizes), len(have_size)):
+            self._sizes.append(self._add_size(index))
+        for index, slider in enumerate(self._sizes):
+            slider.visible = index < len(have_size) and have_size[index]
+        self._hints.content = f"{ARROWS} Drag obstacles by their handles. Keys: {'; '.join(self._key_hints())}"
 
     def follow(self, numbers: Numbers) -> None:
         """Show what a policy, a key or a new scene did."""
         session = self._session
         by_hand = session.choices.driver == "Hand"
         places = session.targets_mm.tolist() if by_hand else numbers.actuated_mm
-        for slider, place in zip((*self._cables, self._desired), (*places, MILLI * numbers.desired), strict=True):
+        for slider, place in zip(self._cables, places, strict=False):  # the others are hidden
             _slide(slider, place)
-        for index, slider in self._sizes.items():
-            _slide(slider, session.dragging.ratios[index])
+        _slide(self._desired, MILLI * numbers.desired)
+        for slider, ratio in zip(self._sizes, session.dragging.ratios, strict=False):
+            _slide(slider, ratio)
         set_value(self._driver, session.choices.driver)
         set_value(self._episodes, session.episodes)
 
@@ -65,47 +88,20 @@ class Controls:
         self._gif.label = STOP_RECORDING if recording else RECORD
         self._gif.color = "red" if recording else None
 
-    def remove(self) -> None:
-        """Remove all of them."""
-        for slider in (self._desired, *self._cables, *self._sizes.values()):
-            slider.remove()
-        for part in (self._driver.remove, self._buttons.remove, self._episodes.remove, self._gif.remove):
-            part()
-        self._hints.remove()
+    def _add_cable(self, index: int) -> Slider:
+        return self._add_slider(lambda value: self._session.pull(index, value), (1 + index) / MOST_SLIDERS)
 
-    def _add_desired(self) -> viser.GuiSliderHandle[float]:
-        session = self._session
-        low, high = (MILLI * bound for bound in session.force_range)
-        slider = self._add_slider("Set-point [mN]", low, high, MILLI * session.desired)
-        self._inputs.on_value(slider, lambda value: session.desire(value / MILLI))
+    def _add_size(self, index: int) -> Slider:
+        slider = self._add_slider(lambda value: self._session.resize(index, value), 0.5 + (1 + index) / MOST_SLIDERS)
+        _set_range(slider, f"Size of obstacle {index + 1}", *RATIOS)
         return slider
 
-    def _add_cables(self) -> list[viser.GuiSliderHandle[float]]:
-        spec = self._session.env.action_spec
-        return [self._add_cable(index) for index in range(spec.size)]
-
-    def _add_cable(self, index: int) -> viser.GuiSliderHandle[float]:
-        session, spec = self._session, self._session.env.action_spec
-        label = f"Cable {index + 1} [mm]" if index < spec.commands else "Length [mm]"
-        low, high, target = (float(array[index]) for array in (spec.low_mm, spec.high_mm, session.targets_mm))
-        slider = self._add_slider(label, low, high, target)
-        self._inputs.on_value(slider, lambda value: session.pull(index, value))
+    def _add_slider(self, act: Callable[[float], object], after: float | None = None) -> Slider:
+        """Add a slider at the end, or after the set-point and before what was added next."""
+        order = None if after is None else self._desired.order + after
+        slider = self._gui.add_slider("", 0.0, 1.0, 0.1, 0.0, order=order)
+        self._inputs.on_value(slider, act)
         return slider
-
-    def _add_sizes(self) -> dict[int, viser.GuiSliderHandle[float]]:
-        scene = self._session.equilibrium.scene
-        return {index: self._add_size(index) for index, obstacle in enumerate(scene) if obstacle.size_fields}
-
-    def _add_size(self, index: int) -> viser.GuiSliderHandle[float]:
-        session = self._session
-        slider = self._add_slider(f"Size of obstacle {index + 1}", *RATIOS, session.dragging.ratios[index])
-        self._inputs.on_value(slider, lambda value: session.resize(index, value))
-        return slider
-
-    def _add_slider(self, label: str, low: float, high: float, value: float) -> viser.GuiSliderHandle[float]:
-        step = float(10.0 ** np.floor(np.log10((high - low) / 100)))
-        low, high = (_rounded(bound, step) for bound in (low, high))
-        return self._gui.add_slider(label, low, high, step, float(np.clip(_rounded(value, step), low, high)))
 
     def _press(self, button: str) -> None:
         session = self._session
@@ -118,7 +114,15 @@ class Controls:
         return [*hints, "**N** new scene", "**T** straighten", "**space** pause", "**G** GIF"]
 
 
-def _slide(slider: viser.GuiSliderHandle[float], value: float) -> None:
+def _set_range(slider: Slider, label: str, low: float, high: float) -> None:
+    decade = int(np.floor(np.log10((high - low) / 100)))
+    step = float(10.0**decade)
+    slider.label, slider.step, slider.precision = label, step, max(0, -decade)
+    slider.min, slider.max = _rounded(low, step), _rounded(high, step)
+    _slide(slider, slider.value)
+
+
+def _slide(slider: Slider, value: float) -> None:
     set_value(slider, float(np.clip(_rounded(value, slider.step), slider.min, slider.max)))
 
 

@@ -52,7 +52,10 @@ class Page:
         with self._drive:
             self._status = server.gui.add_html(self._status_html(frame))
             server.gui.add_html(f"<style onload=\"document.title = '{TITLE}'\"></style>")
-        self._world, self._controls, self._plots = self._new_world(frame), self._new_controls(), self._new_plots(frame)
+            self._controls = Controls(server.gui, session, self._inputs, self._toggle_recording)
+        with self._charts:
+            self._plots = Plots(server.gui, len(frame.numbers.tensions))
+        self._world = self._new_world(frame)
 
     def tick(self) -> None:
         """Take in what the user did, move the session by a step and show it."""
@@ -82,23 +85,16 @@ class Page:
     def _rebuild(self, frame: Frame) -> None:
         """Show another environment."""
         self._generation, self._stops = self._session.generation, self._session.dragging.stops
-        self._controls.remove()
-        self._plots.remove()
-        self._world, self._controls, self._plots = self._new_world(frame), self._new_controls(), self._new_plots(frame)
+        self._world = self._new_world(frame)
+        with self._drive:
+            self._controls.fit()
+        with self._charts:
+            self._plots.fit(len(frame.numbers.tensions))
 
     def _new_world(self, frame: Frame) -> World:
         settings = self._session.env.settings
         length, radius = settings.scales.length_mm, float(settings.robot.edge_mm)
         return World(self._server, frame, length, radius, self._dragged)
-
-    def _new_controls(self) -> Controls:
-        with self._drive:
-            recording = self._recorder.path is not None
-            return Controls(self._server.gui, self._session, self._inputs, self._toggle_recording, recording)
-
-    def _new_plots(self, frame: Frame) -> Plots:
-        with self._charts:
-            return Plots(self._server.gui, len(frame.numbers.tensions))
 
     def _status_html(self, frame: Frame) -> str:
         return status_html(frame.numbers, len(frame.contacts.points), self._ticks)

@@ -12,9 +12,10 @@ from agents.play.choices import Choices
 from agents.play.dragging import Dragging
 from agents.play.frame import Frame, Numbers
 from agents.play.shapes import AnyEquilibrium, contacts_of, shape_of
+from agents.play.words import in_words
 from agents.policy import Policy
 from ccr_gym import ContactEnv
-from solver import Status
+from solver import Obstacle, Status
 
 RESIDUAL_EVERY = 20  # ticks between two certificates, which take up to 90 ms in space
 FRESH = 512  # steps after which a policy begins anew, as its memory of an episode grows
@@ -149,7 +150,11 @@ class Session:
         try:
             action()
         except (ValueError, RuntimeError) as error:
-            self.say(str(error))
+            self._say_error(error)
+
+    def _say_error(self, error: Exception, *others: Obstacle) -> None:
+        """Say what is wrong, which may be about the present obstacles or others."""
+        self.say(in_words(str(error), (*self.equilibrium.scene, *self.equilibrium.scene_now, *others)))
 
     def _choose(self, choices: Choices) -> None:
         same = replace(choices, driver=self.choices.driver) == self.choices
@@ -206,7 +211,7 @@ class Session:
             reached = self.env.move_obstacles(wanted)
         except ValueError as error:
             self._dragging.stop()
-            self.say(str(error))
+            self._say_error(error, *wanted)
             return
         if reached != wanted:
             self._dragging.stop()

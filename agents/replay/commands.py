@@ -27,7 +27,7 @@ def commands_mm(log: Log, robot: AnyRobot, name: str) -> np.ndarray:
         name: Name of the log, for messages.
 
     Raises:
-        UserError: If cables of a section contradict each other, naming row and column.
+        UserError: If cables of a section contradict each other, naming line and column.
     """
     actuation, columns = actuation_of(robot), cable_columns(robot)[0]
     if actuation.recovery is None:
@@ -38,8 +38,9 @@ def commands_mm(log: Log, robot: AnyRobot, name: str) -> np.ndarray:
     for row, column in np.argwhere(np.where(log.cables_mm > 0, np.abs(off), off) > most):
         wanted = log.cables_mm[row, column] - off[row, column]
         raise UserError(
-            f"{name}, row {log.rows[row]}, column {columns[column]}: {log.cables_mm[row, column]:g} mm contradicts the "
-            f"other cables of its section, by which it is {wanted:.3g} mm; the shape needs them within {most:.3g} mm"
+            f"{name}, line {log.rows[row]}, column {columns[column]}: {log.cables_mm[row, column]:g} mm contradicts "
+            f"the other cables of its section, by which it is {wanted:.3g} mm; the shape needs them within "
+            f"{most:.3g} mm"
         )
     return commands
 

@@ -1,6 +1,7 @@
 """The replay of a log: solver and estimator, row by row."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from agents.arguments import check_kind
 from agents.estimation.robot import Knowledge, RobotEstimator
 from agents.replay.commands import commands_mm
 from agents.replay.correction import CORRECTION_ERROR, corrections
+from agents.replay.limits import warnings_of
 from agents.replay.log import Log
 from agents.replay.model import AnyEquilibrium, Model, followed, positions
 from agents.replay.observations import check_commands, observations, settings_of
@@ -34,6 +36,7 @@ class Estimates:
         obstacle_forces_n: Force of each obstacle on the robot, in the direction and with the share that the model
             says, ``(K, m, d)`` [N].
         shapes: Shapes of the model where the cables are estimated to be.
+        warnings: What is wrong with each estimate that ended at the end of its range, by its name.
     """
 
     log: Log
@@ -44,6 +47,7 @@ class Estimates:
     force_std_n: np.ndarray
     obstacle_forces_n: np.ndarray
     shapes: tuple[AnyEquilibrium, ...]
+    warnings: Mapping[str, str] = field(default_factory=dict)
 
     def history(self, name: str) -> np.ndarray:
         """Return a number of :class:`agents.Knowledge` after each row, ``(K,)``."""
@@ -104,7 +108,8 @@ def estimate_log(log: Log, robot: AnyRobot, scene: Scene, instruments: Instrumen
     read, spread = (scales.force_n * np.array([float(getattr(k, name)) for k in known]) for name in FORCE)
     force, deviation = ratio * read, np.hypot(ratio * spread, CORRECTION_ERROR * (ratio - 1) * read)
     shares = np.array([_shares(*pair) for pair in zip(shapes, nominal, strict=True)])
-    return Estimates(log, commands, known, scales, force, deviation, force[:, None, None] * shares, shapes)
+    warnings = warnings_of(known[-1], instruments, scales, bool(log.nodes.size))
+    return Estimates(log, commands, known, scales, force, deviation, force[:, None, None] * shares, shapes, warnings)
 
 
 def _shares(shape: AnyEquilibrium, nominal: AnyEquilibrium) -> np.ndarray:

@@ -38,7 +38,7 @@ def read_json(path: Path | str) -> object:
     try:
         return json.loads(read_text(path), object_pairs_hook=_unique, parse_constant=_refused)
     except json.JSONDecodeError as error:
-        raise UserError(f"{path}, row {error.lineno}, column {error.colno}: {error.msg}") from error
+        raise UserError(f"{path}, line {error.lineno}, column {error.colno}: {error.msg}") from error
     except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: {error}") from error
 

@@ -27,7 +27,7 @@ class Log:
     """What a robot has logged, in K rows.
 
     Attributes:
-        rows: Row of each entry in the file, the header being row 1, ``(K,)``.
+        rows: Line of the file of each entry, the header being line 1, ``(K,)``.
         time_s: Time, ``(K,)`` [s]; None where it was not logged.
         cables_mm: Displacement of each cable, positive where it is pulled, ``(K, c)`` [mm].
         tensions_n: Tension of each cable as its motor feels it, ``(K, c)`` [N].
@@ -90,7 +90,7 @@ def read_log(path: Path | str, robot: AnyRobot) -> Log:
 
     Raises:
         TypeError: If the robot or the path is none.
-        UserError: If the header or a cell is not as documented, naming row and column.
+        UserError: If the header or a cell is not as documented, naming line and column.
     """
     check_robot(robot)
     path = Path(path) if isinstance(path, str) else path
@@ -130,21 +130,32 @@ def _table(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
                 continue
             if not header:
                 header = [cell.strip() for cell in cells[:MOST_COLUMNS]]
+                _check_separator(path, header)
                 continue
             rows.append(reader.line_num)
             numbers.append(_numbers(path, header, reader.line_num, cells))
             if len(rows) > MOST_ROWS:
                 raise UserError(f"{path} has more than {MOST_ROWS} rows; log less often, or cut the file")
     except csv.Error as error:
-        raise UserError(f"{path}, row {reader.line_num}: {error}") from error
+        raise UserError(f"{path}, line {reader.line_num}: {error}") from error
     if not rows:
         raise UserError(f"{path} has no rows of numbers below a header")
     return header, np.array(rows), np.array(numbers)
 
 
+def _check_separator(path: Path, header: list[str]) -> None:
+    """Refuse a file whose cells are not separated by commas, as spreadsheets of many countries write them."""
+    for sign, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and sign in header[0]:
+            raise UserError(
+                f"{path}: cells are separated by {name}; they must be separated by commas, and numbers have decimal "
+                "points: export the log as comma-separated values"
+            )
+
+
 def _numbers(path: Path, header: list[str], row: int, cells: list[str]) -> list[float]:
     if len(cells) != len(header):
-        raise UserError(f"{path}, row {row}: there are {len(cells)} cells; the header has {len(header)}")
+        raise UserError(f"{path}, line {row}: there are {len(cells)} cells; the header has {len(header)}")
     return [_number(path, row, name, cell) for name, cell in zip(header, cells, strict=True)]
 
 
@@ -154,7 +165,7 @@ def _number(path: Path, row: int, name: str, cell: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= MOST:
-        raise UserError(f"{path}, row {row}, column {name}: {cell[:40]!r} is not a number up to {MOST:g} in size")
+        raise UserError(f"{path}, line {row}, column {name}: {cell[:40]!r} is not a number up to {MOST:g} in size")
     return value
 
 
@@ -176,18 +187,18 @@ def _check_header(path: Path, header: list[str], needed: list[str], positions: l
     wanted = f"{', '.join(needed)}, and if they were measured time_s, tip_x_mm, tip_y_mm, … or node_1_x_mm, …"
     for name in [*needed, *positions]:
         if name not in header:
-            raise UserError(f"{path}, row 1: the column {name} is missing; the columns are {wanted}")
+            raise UserError(f"{path}, line 1: the column {name} is missing; the columns are {wanted}")
     for name in header:
         if header.count(name) > 1:
-            raise UserError(f"{path}, row 1: the column {name} is given twice")
+            raise UserError(f"{path}, line 1: the column {name} is given twice")
         if name not in (*needed, *positions, "time_s"):
-            raise UserError(f"{path}, row 1: the column {name!r} is unknown; the columns are {wanted}")
+            raise UserError(f"{path}, line 1: the column {name!r} is unknown; the columns are {wanted}")
 
 
 def _check_times(path: Path, rows: np.ndarray, time: np.ndarray) -> None:
     for row, before, now in zip(rows[1:], time, time[1:], strict=False):
         if not now > before:
-            raise UserError(f"{path}, row {row}, column time_s: {now:g} must be above {before:g}, the row before")
+            raise UserError(f"{path}, line {row}, column time_s: {now:g} must be above {before:g}, the line before")
 
 
 def _check_signs(path: Path, tensions_n: np.ndarray, cables: np.ndarray) -> None:
@@ -204,6 +215,6 @@ def _check_range(path: Path, rows: np.ndarray, names: list[str], cables: np.ndar
     low, high, noise = robot.least_cable_mm, robot.cable_limit_mm, ENCODER_NOISE * robot.offset_mm
     for row, column in np.argwhere((cables < low - noise) | (cables > high + noise)):
         raise UserError(
-            f"{path}, row {rows[row]}, column {names[column]}: {cables[row, column]:g} is out of range; it must be "
+            f"{path}, line {rows[row]}, column {names[column]}: {cables[row, column]:g} is out of range; it must be "
             f"from {low:.6g} to {high:.6g} mm, the max_cable_mm of the robot"
         )

@@ -59,12 +59,12 @@ def check_commands(commands_mm: np.ndarray, log: Log, robot: AnyRobot, name: str
     """Check that commands of several sections are within what an environment can command.
 
     Raises:
-        UserError: Naming the row, the section and the bound.
+        UserError: Naming the line, the section and the bound.
     """
     limit = _ranges(robot)["cable_limit_mm"]
     for row, command in np.argwhere(np.abs(commands_mm) > limit * (1 + 1e-9)):
         raise UserError(
-            f"{name}, row {log.rows[row]}: the cables bend a section by {commands_mm[row, command]:.4g} mm of cable; "
+            f"{name}, line {log.rows[row]}: the cables bend a section by {commands_mm[row, command]:.4g} mm of cable; "
             f"at most {limit:.4g} are allowed, max_cable_mm of the robot over its sections: raise max_cable_mm"
         )
 

@@ -71,8 +71,9 @@ def summary(found: Estimates) -> dict[str, object]:
     hidden = {name: _rounded(values[-1]) for name, values in _hidden(found).items()}
     largest = int(found.force_n.argmax())
     force = {"force_n": _rounded(found.force_n[largest]), "force_std_n": _rounded(found.force_std_n[largest])}
-    largest_force = {"row": int(found.log.rows[largest]), **force}
+    largest_force = {"row": int(found.log.rows[largest]), **force} if found.force_n[largest] > 0 else None
     known: dict[str, object] = {"rows": len(found.log.rows), "at_the_end": hidden, "largest_force": largest_force}
+    known |= {"warnings": list(found.warnings.values())}
     if found.log.nodes.size:
         known |= {"latency_rows": found.latency_rows, "latency_rows_std": _rounded(found.known[-1].latency_std)}
         known |= {"median_position_error_mm": _rounded(np.median(found.position_errors_mm))}

@@ -44,6 +44,15 @@ COUNT_DRAWN = """() => new Promise(done => {  // frames for which the scene got 
     time > 8000 ? done(1000 * count / time) : requestAnimationFrame(frame) };
   requestAnimationFrame(frame) })"""
 
+HOLD_FRAMES = """const draw = window.requestAnimationFrame.bind(window);
+window.requestAnimationFrame = callback => {
+  const wait = time => window.held ? draw(wait) : callback(time);
+  return draw(wait) }"""
+HOLD_AND_CLICK = """option => new Promise(done => {  // what the page is sent in 4 s comes to it in one frame
+  window.held = true;
+  setTimeout(() => option.click(), 1000);
+  setTimeout(() => { window.held = false; done() }, 4000) })"""
+
 
 @pytest.fixture(scope="module")
 def url(tmp_path_factory):
@@ -76,7 +85,7 @@ def browser():
 def page(browser, url):
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.set_default_timeout(PATIENCE_MS)
-    page.add_init_script(NOTE_UPLOADS)
+    page.add_init_script(NOTE_UPLOADS + HOLD_FRAMES)
     page.errors, page.outside = [], []
     page.on("console", lambda message: page.errors.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: page.errors.append(str(error)))
@@ -219,6 +228,21 @@ def test_updates_a_second_with_a_policy(page, browser, url, capsys):
         print(f"CPU per tick: {used[0]:.1f} ms in the server, {used[1]:.1f} ms in the browser, without a GPU")
     assert ticks / seconds >= UPDATES * min(1.0, frames / FULL)
     assert drawn >= DRAWN * min(1.0, frames / FULL)
+
+
+def test_a_page_that_stalls_while_the_task_changes_catches_up(page):
+    """A page handles what it was sent between two frames at once, removals of components before updates.
+
+    A policy drives, so that the scene moves: what touches the panels alone is not kept for the next frame.
+    """
+    page.get_by_role("tab", name="Setting").click()
+    for task in ("CCR/SpatialPush-v1", "CCR/MovingObstacle-v1", "CCR/TrackForce-v1"):
+        page.get_by_label("Task", exact=True).first.click()
+        page.get_by_role("option", name=task, exact=True).evaluate(HOLD_AND_CLICK)
+        page.wait_for_timeout(1000)
+        assert page.get_by_label("Task", exact=True).first.input_value() == task
+    shoot(page, "stalled.png")
+    assert page.errors == []
 
 
 def test_no_error_and_nothing_from_elsewhere(page):

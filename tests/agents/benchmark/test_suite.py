@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from agents import cli
-from agents.benchmark import report, suite
+from agents.benchmark import figures, report, suite
 from agents.benchmark.evaluate import METRICS, Episode, measure, run_episode, scores
 from agents.benchmark.suite import CONTROLLERS, Entry, play
 from agents.benchmark.sweep import sweep
@@ -97,9 +97,21 @@ def test_videos_show_the_scene_where_policies_differ_most_of_those_where_the_bes
     assert suite.telling_scene([result([1.0, 2.0], [0, 0]), result([9.0, 3.0], [0, 0])]) == 0
 
 
-@pytest.mark.parametrize(("steps", "shown"), [(64.0, "64"), (64.5, "never"), (65.0, "never")])
-def test_what_does_not_settle_never_does(steps, shown):
-    assert report.COLUMNS["settled [step]"]({"settling_step": steps, "steps": 64}) == shown
+@pytest.mark.parametrize(
+    ("steps", "settled", "shown"), [(64.0, 0.6, "64"), (64.0, 0.5, "never"), (64.5, 0.5, "never"), (65.0, 0.4, "never")]
+)
+def test_what_does_not_settle_never_does(steps, settled, shown):
+    summary = {"settling_step": steps, "steps": 64, "success": settled}
+    assert report.COLUMNS["settled [step]"](summary) == shown
+
+
+@pytest.mark.parametrize(
+    ("steps", "median"), [([63, 63, 65, 65], 65), ([10, 20, 65, 65], 65), ([10, 20, 30, 65], 25), ([10, 65, 65], 65)]
+)
+def test_episodes_that_do_not_settle_count_as_infinite(steps, median):
+    metrics = {name: np.ones((1, len(steps))) for name in METRICS}
+    metrics |= {"settling_step": np.array([steps], float), "success": np.array([steps]) <= 64}
+    assert suite.summarize(metrics)["settling_step"] == median
 
 
 def test_printed_tables_fit_80_columns_and_leave_out_what_is_empty(capsys):
@@ -115,6 +127,37 @@ def test_printed_tables_fit_80_columns_and_leave_out_what_is_empty(capsys):
     assert notes == ["force error", "worst tenth", "steady", "within 5 %", "settled", "overshoot", "peak"]
     assert any("RecurrentPPO" in line and "never" in line for line in lines)
     assert "training" not in report.markdown(by_id)
+
+
+def test_a_policy_without_error_is_seen_among_others(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(figures, "_save", lambda figure, path: drawn.append(figure))
+    summaries = {"PI": (9.0, 8.0, 10.0), "Oracle": (0.001, 0.0, 0.002)}
+    summaries = {name: {"rmse_iqm_mn": m, "rmse_interval_mn": ends} for name, (m, *ends) in summaries.items()}
+    figures.draw_scores({"CCR/LoadCell-v1": summaries}, tmp_path)
+    (axis,) = drawn[0].axes
+    marks = [line for line in axis.lines if line.get_marker() == "D"]
+    assert [tuple(line.get_ydata()) for line in marks] == [(1,)]  # the row of the oracle
+    assert not marks[0].get_clip_on()
+
+
+@pytest.mark.parametrize("trained", [True, False])
+def test_scores_are_written_of_trained_policies_alone(trained, tmp_path, monkeypatch):
+    for name in ("show", "_draw", "_write_cards"):
+        monkeypatch.setattr(report, name, lambda *_: None)
+    (tmp_path / "scores.json").write_text('{"PPO CCR/TrackForce-v1": [1.0]}')  # of an earlier evaluation
+    metrics = {name: np.full((1, 3), 2.0) for name in METRICS}
+    summary = suite.summarize(metrics) | {
+        "statuses": {"CONVERGED": 3},
+        "decisions_per_second": 1.0,
+        "training_seconds": 0,
+    }
+    files = (tmp_path / "0.safetensors",) if trained else ()
+    entry = suite.Entry("PPO" if trained else "PI", "CCR/LoadCell-v1", "realistic", files)
+    report.write([suite.Result(entry, metrics, summary)], EvaluateConfig(out=tmp_path))
+    written = tmp_path / "scores.json"
+    assert written.exists() is trained
+    assert not trained or json.loads(written.read_text()) == {"PPO CCR/LoadCell-v1": [2.0, 2.0, 2.0]}
 
 
 def test_every_column_of_a_table_is_explained():

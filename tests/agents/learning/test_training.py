@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents import files
+from agents import commands, files
 from agents.config import MAX_ENVS, PER_CORE, TrainConfig
 from agents.environment import make_env
 from agents.errors import UserError
@@ -23,7 +23,7 @@ from agents.learning.network import CLIP, EPSILON, Network
 from agents.learning.pretrained import trained
 from agents.learning.tensors import read_tensors, write_tensors
 from agents.learning.training import is_finished, train
-from agents.tuned import DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings
+from agents.tuned import DistilledSettings, PPOSettings, RecurrentPPOSettings, SACSettings, round_steps
 from ccr_gym import vector_env
 
 SMALL = {
@@ -74,6 +74,22 @@ def test_the_actor_acts_as_the_learner_does(name, tmp_path, monkeypatch):
     assert actor.training.config == replace(config, run=Path())
     assert (tmp_path / ACTOR).stat().st_size < 20_000
     assert any(tmp_path.glob("log_1/events*"))
+
+
+@pytest.mark.parametrize("learner", [*SMALL.values(), IMITATION], ids=lambda learner: learner.name)
+def test_the_command_says_how_many_steps_are_played(learner, tmp_path, monkeypatch, capsys):
+    made, saved = [], []
+    monkeypatch.setattr(training, "make_learner", lambda *given: made.append(make_learner(*given)) or made[0])
+    monkeypatch.setattr(checkpoint.TrainingRun, "save_if_due", lambda run, steps, state: saved.append(steps))
+    monkeypatch.setattr(training, "train", lambda config: train(config, progress=False))
+    config = TrainConfig(run=tmp_path, learner=replace(learner, steps=50), threads=1)
+    commands.train(config)
+    played = made[0].num_timesteps if made else max(saved)
+    assert played != 50
+    whole = f"Training plays {played} steps, whole rounds of {round_steps(learner)}, where --steps asks for 50\n"
+    said = capsys.readouterr().out
+    assert whole in said
+    assert f"for {played} steps on" in said
 
 
 @pytest.fixture

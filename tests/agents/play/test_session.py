@@ -1,5 +1,7 @@
 """A session without a browser: every input at any time, none of which may raise."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -137,6 +139,18 @@ def test_a_learned_policy_leaves_a_robot_that_it_does_not_know():
     session.choose("robot", "snake_arm")
     assert "cannot drive" in session.tick().numbers.message
     assert session.choices.driver == "Hand"
+
+
+def test_messages_name_obstacles_in_words():
+    session = Session(Choices())
+    drag_into_robot(session)
+    x, y = session.equilibrium.scene.obstacles[0].center
+    session.straighten()
+    message = session.tick().numbers.message
+    assert re.fullmatch(
+        rf"The circle of radius \d+\.\d mm at \({x:.1f}, {y:.1f}\) mm overlaps the unstressed robot by .* at node \d+",
+        message,
+    )
 
 
 def test_straighten_keeps_scene_and_set_point():

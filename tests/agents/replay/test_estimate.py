@@ -126,6 +126,42 @@ def test_the_example_agrees_with_its_truth(tmp_path, monkeypatch, capsys):
     assert "within two standard deviations in 1" in capsys.readouterr().out
 
 
+def example_log(tmp_path, rows=None, **factors):
+    """Write the example's log with other units, or its first rows; return the arguments of the command."""
+    lines = [line.split(",") for line in (EXAMPLE / "log.csv").read_text().splitlines()]
+    header, *table = lines
+    for row in table:
+        for name, factor in factors.items():
+            row[header.index(name)] = repr(factor * float(row[header.index(name)]))
+    log = tmp_path / "log.csv"
+    log.write_text("".join(",".join(line) + "\n" for line in [header, *table[:rows]]))
+    files = ["--robot", EXAMPLE / "robot.json", "--scene", EXAMPLE / "scene.json", "--out", tmp_path]
+    return ["ccr-gym", "estimate", *map(str, [log, *files])]
+
+
+@pytest.mark.parametrize(("factor", "ratio"), [(1e3, "3"), (1e-3, "0.3")])
+def test_an_estimate_at_the_end_of_its_range_is_warned_of(factor, ratio, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", example_log(tmp_path, tension_n=factor))
+    cli.main()
+    printed = capsys.readouterr()
+    warning = (
+        f"rigidity over that of the robot's file is {ratio}, at the end of its range, 0.3 to 3: check that tensions"
+    )
+    assert f"ccr-gym: warning: {warning}" in printed.err
+    assert "robot.json (at the end of its range)\n" in printed.out
+    assert warning in json.loads((tmp_path / "estimate.json").read_text())["warnings"][0]
+
+
+def test_the_example_is_within_all_ranges_and_without_contact_says_so(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", example_log(tmp_path, rows=40))
+    cli.main()
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert "range" not in printed.out
+    assert "Largest contact force: no contact\n" in printed.out
+    assert json.loads((tmp_path / "estimate.json").read_text())["largest_force"] is None
+
+
 def test_the_example_is_what_its_script_writes(tmp_path):
     example = runpy.run_path(str(EXAMPLE / "make_log.py"))
     example["main"](example["Args"](out=tmp_path))
@@ -142,7 +178,8 @@ def test_errors_are_one_line(tmp_path, monkeypatch, capsys):
         cli.main()
     assert caught.value.code == 2
     assert (
-        capsys.readouterr().err == f"ccr-gym: {log}, row 2, column tension_n: 'x' is not a number up to 1e+09 in size\n"
+        capsys.readouterr().err
+        == f"ccr-gym: {log}, line 2, column tension_n: 'x' is not a number up to 1e+09 in size\n"
     )
 
 
@@ -174,7 +211,7 @@ def test_what_is_known_at_the_end_has_six_digits_and_no_latency_without_position
     log, robot = read_log(EXAMPLE / "log.csv", Robot.prototype()), Robot.prototype()
     blind = replace(log, nodes=np.zeros(0, int), positions_mm=np.zeros((len(log.rows), 0, 2)))
     known = summary(estimate_log(blind, robot, Scene(CIRCLE), read_instruments(None, robot)))
-    assert set(known) == {"rows", "at_the_end", "largest_force"}
+    assert set(known) == {"rows", "at_the_end", "largest_force", "warnings"}
     for value in (*known["at_the_end"].values(), *known["largest_force"].values()):
         assert value == float(f"{value:.6g}")
 

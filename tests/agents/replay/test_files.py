@@ -65,7 +65,7 @@ def test_a_custom_shape_is_no_data():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"preset": "prototype",}', "row 1, column 24: "),
+        ('{"preset": "prototype",}', "line 1, column 24: "),
         ('{"preset": "prototype", "preset": "guidewire"}', "'preset' is given twice"),
         ('{"preset": "prototype", "rigidity": NaN}', "NaN is not JSON"),
         ("[" * 100_000, "recursion"),

@@ -1,4 +1,4 @@
-"""Logs: every cell is checked, and an error names its row and column."""
+"""Logs: every cell is checked, and an error names its line and column."""
 
 import numpy as np
 import pytest
@@ -46,21 +46,23 @@ def test_nodes_and_the_tip_in_space(path):
     [
         ("", "has no rows"),
         ("cable_mm,tension_n\n", "has no rows"),
-        ("cable_mm\n1\n", "row 1: the column tension_n is missing"),
-        ("cable_mm,tension_n,tip_x_mm\n1,2,3\n", "row 1: the column tip_y_mm is missing"),
-        ("cable_mm,tension_n,Force\n1,2,3\n", "row 1: the column 'Force' is unknown"),
-        ("cable_mm,tension_n,tip_z_mm\n1,2,3\n", "row 1: the column 'tip_z_mm' is unknown"),
-        ("cable_mm,tension_n,tension_n\n1,2,3\n", "row 1: the column tension_n is given twice"),
+        ("cable_mm\n1\n", "line 1: the column tension_n is missing"),
+        ("cable_mm,tension_n,tip_x_mm\n1,2,3\n", "line 1: the column tip_y_mm is missing"),
+        ("cable_mm,tension_n,Force\n1,2,3\n", "line 1: the column 'Force' is unknown"),
+        ("cable_mm,tension_n,tip_z_mm\n1,2,3\n", "line 1: the column 'tip_z_mm' is unknown"),
+        ("cable_mm,tension_n,tension_n\n1,2,3\n", "line 1: the column tension_n is given twice"),
         ("cable_mm,tension_n,node_19_x_mm,node_19_y_mm\n1,2,3,4\n", "column node_19_x_mm: the nodes of this robot are"),
-        ("cable_mm,tension_n\n1,2\n1\n", "row 3: there are 1 cells; the header has 2"),
-        ("cable_mm,tension_n\n1,2\n1,\n", "row 3, column tension_n: '' is not a number"),
-        ("cable_mm,tension_n\n1,=cmd()\n", "row 2, column tension_n: '=cmd()' is not a number"),
-        ("cable_mm,tension_n\n1,nan\n", "row 2, column tension_n: 'nan' is not a number"),
-        ("cable_mm,tension_n\n1,1e400\n", "row 2, column tension_n: '1e400' is not a number"),
-        ("cable_mm,tension_n\n1,1_0\n", "row 2, column tension_n: '1_0' is not a number"),
-        ("cable_mm,tension_n\n-1,1\n", "row 2, column cable_mm: -1 is out of range; it must be from 0 to 25.1327 mm"),
-        ("time_s,cable_mm,tension_n\n1,1,1\n1,1,1\n", "row 3, column time_s: 1 must be above 1, the row before"),
-        ('cable_mm,tension_n\n1,"2\n', "row 2: unexpected end of data"),
+        ("cable_mm;tension_n\n1,5;2,0\n", "cells are separated by semicolons; they must be separated by commas"),
+        ("cable_mm\ttension_n\n1\t2\n", "cells are separated by tabs; they must be separated by commas"),
+        ("cable_mm,tension_n\n1,2\n1\n", "line 3: there are 1 cells; the header has 2"),
+        ("cable_mm,tension_n\n1,2\n1,\n", "line 3, column tension_n: '' is not a number"),
+        ("cable_mm,tension_n\n1,=cmd()\n", "line 2, column tension_n: '=cmd()' is not a number"),
+        ("cable_mm,tension_n\n1,nan\n", "line 2, column tension_n: 'nan' is not a number"),
+        ("cable_mm,tension_n\n1,1e400\n", "line 2, column tension_n: '1e400' is not a number"),
+        ("cable_mm,tension_n\n1,1_0\n", "line 2, column tension_n: '1_0' is not a number"),
+        ("cable_mm,tension_n\n-1,1\n", "line 2, column cable_mm: -1 is out of range; it must be from 0 to 25.1327 mm"),
+        ("time_s,cable_mm,tension_n\n1,1,1\n1,1,1\n", "line 3, column time_s: 1 must be above 1, the line before"),
+        ('cable_mm,tension_n\n1,"2\n', "line 2: unexpected end of data"),
     ],
 )
 def test_what_is_wrong_is_one_line(text, message, path):
@@ -105,7 +107,7 @@ def test_commands_follow_the_cables_that_are_pulled(path):
 @pytest.mark.parametrize("cables", [(3, 3, 8, -8), (3, 1, 8, -8)])
 def test_cables_that_contradict_each_other_are_named(cables, path):
     log = snake_log(path, (0, 0, 0, 0), cables)
-    with pytest.raises(UserError, match=r"log, row 3, column cable_[01]_mm: .* contradicts the other cables"):
+    with pytest.raises(UserError, match=r"log, line 3, column cable_[01]_mm: .* contradicts the other cables"):
         commands_mm(log, SNAKE, "log")
 
 
