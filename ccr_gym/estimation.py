@@ -189,7 +189,7 @@ class ForceEstimator:
     def __init__(self, adapter: AnyAdapter, count: int, threads: int, *, learns: bool) -> None:
         self._adapter, self.learns = adapter, learns
         self._contact = adapter.settings.estimator == "contact"
-        self._tip_known = adapter.layout.tip_slopes.shape != (0,)
+        self._tip_known = _tip_known(adapter)
         needed = self._contact or not self._tip_known or learns
         self._free = FreeRobots(adapter, count, threads) if needed else None
         self._slopes = _straight_lines(adapter)
@@ -303,6 +303,13 @@ class ForceEstimator:
         works = -np.stack([dot(total, motion.tips[:, k]) for k in range(motion.tips.shape[1])], axis=-1)
         given = adapter.actuation.forces(loads)
         return np.asarray(np.maximum(dot(works, given), 0.0) / np.maximum(dot(works, works), TINY))
+
+
+def _tip_known(adapter: AnyAdapter) -> bool:
+    """Return whether the solver tells the slopes of the free tip: those of a planar rod only where it bends evenly."""
+    robot = adapter.settings.robot
+    evenly = not isinstance(robot, Robot) or robot.bends_evenly
+    return evenly and adapter.layout.tip_slopes.shape != (0,)
 
 
 def _straight_lines(adapter: AnyAdapter) -> np.ndarray | None:

@@ -14,18 +14,10 @@ from solver.common.status import Status
 from solver.common.trace import Trace
 from solver.common.transmission import Transmission
 from solver.planar.batch import BatchSolver, ReferenceBatch
+from solver.planar.contact_force import contact_estimate, shape_estimate
 from solver.planar.custom import Custom
 from solver.planar.equilibrium import Equilibrium
-from solver.planar.estimators import (
-    Motion,
-    RigidityFit,
-    contact_estimate,
-    force_factor,
-    free_motion,
-    point_forces,
-    shape_estimate,
-    shape_motion,
-)
+from solver.planar.estimators import Motion, RigidityFit, force_factor, free_motion, point_forces, shape_motion
 from solver.planar.family import Family
 from solver.planar.forces import VirtualWork, force_true, onset_tension, virtual_work
 from solver.planar.free import clearance, fitted_slopes, free_nodes, free_tension, tip_slopes

@@ -31,7 +31,7 @@ def commands_mm(log: Log, robot: AnyRobot, name: str) -> np.ndarray:
     """
     actuation, columns = actuation_of(robot), cable_columns(robot)[0]
     if actuation.recovery is None:
-        return log.cables_mm.copy()
+        return actuation.reached(log.cables_mm, log.cables_mm)
     commands = np.array([_fitted(actuation.matrix, cables) for cables in log.cables_mm])
     off = log.cables_mm - actuation.cables_mm(commands)
     most = APART * robot.offset_mm

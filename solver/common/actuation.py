@@ -23,7 +23,7 @@ class Actuation:
     Attributes:
         matrix: Displacement of each cable per command, ``(cables, commands)``.
         recovery: Change of the commands per millimetre by which a pulled cable stops short, ``(commands, cables)``;
-            ``None`` where each command is the displacement of a cable.
+            ``None`` where each command is that of one cable alone.
         sections: Number of sections.
         directions: Commands that bend all sections alike, per millimetre of their sum, for each axis of bending,
             ``(commands, axes)``.
@@ -70,7 +70,7 @@ class Actuation:
         low = np.sign(np.minimum(pulls.min(axis=0), 0.0)).ravel()
         high = np.sign(np.maximum(pulls.max(axis=0), 0.0)).ravel()
         directions = np.tile(np.eye(axes), (len(ends), 1)) / len(ends)
-        return cls(matrix, None if cables == 1 else recovery, len(ends), directions, low, high)
+        return cls(matrix, None if matrix.size == 1 else recovery, len(ends), directions, low, high)
 
     def cables_mm(self, commands: np.ndarray) -> np.ndarray:
         """Return the displacements of the cables, ``(..., cables)``, for commands ``(..., commands)`` [mm]."""
@@ -85,7 +85,7 @@ class Actuation:
         """
         wanted, cables_mm = self.cables_mm(commands), check_numbers("cables_mm", cables_mm, (..., len(self.matrix)))
         if self.recovery is None:
-            return cables_mm.copy()
+            return np.asarray(cables_mm / np.diagonal(self.matrix))
         check_alike(commands=wanted.shape[:-1], cables_mm=cables_mm.shape[:-1])
         short = np.where(wanted > 0, np.minimum(cables_mm - wanted, 0.0), 0.0)
         return np.asarray(commands + _product(self.recovery, "cables_mm", short))

@@ -10,7 +10,8 @@ The two estimates differ in the shape at which the motion is taken. ``contact`` 
 displacement, which is right at small deflection; ``shape`` takes the measured shape and is right at any.
 
 Everything works on one robot or on arrays of them (...), with cables along an axis c, so that robots of several cables
-can share the formula. k is learnt before contact, see :class:`RigidityFit`.
+can share the formula. k is learnt before contact, see :class:`RigidityFit`. The motions here are in closed form, those
+of robots that one cable bends evenly; :mod:`solver.planar.contact_force` has those of any robot.
 """
 
 import math
@@ -24,7 +25,6 @@ from solver.common.validation import (
     LARGEST,
     check_alike,
     check_array,
-    check_finite,
     check_instance,
     check_numbers,
     check_positive,
@@ -106,52 +106,6 @@ class RigidityFit:
         return type(self)(self.products + weight * products, self.squares + weight * squares)
 
 
-def contact_estimate(nominal: Equilibrium, tension: float, rigidity_ratio: float = 1.0) -> np.ndarray:
-    """Estimate the contact force from tension and displacement of the cable, ``(m, 2)`` [N].
-
-    Args:
-        nominal: Equilibrium of the nominal robot in the known scene at the measured displacement.
-        tension: Measured cable tension [N].
-        rigidity_ratio: Rigidity over its nominal value k, as :attr:`RigidityFit.ratio`.
-
-    Raises:
-        ValueError: If tension or ratio is not a finite number, or the ratio is not positive.
-        TypeError: If ``nominal`` is not an equilibrium of the plane.
-    """
-    check_instance("nominal", nominal, Equilibrium, "take one of a solver of the plane")
-    return _estimate(nominal, free_motion(nominal.robot, *_cable_and_length(nominal)), tension, rigidity_ratio)
-
-
-def shape_estimate(nominal: Equilibrium, nodes: np.ndarray, tension: float, rigidity_ratio: float = 1.0) -> np.ndarray:
-    """Estimate the contact force from the cable's tension and the measured shape, ``(m, 2)`` [N].
-
-    Args:
-        nominal: Equilibrium of the nominal robot in the known scene at the measured displacement.
-        nodes: Measured node poses, ``(n+1, 3)`` [mm, mm, rad].
-        tension: Measured cable tension [N].
-        rigidity_ratio: Rigidity over its nominal value k, as :attr:`RigidityFit.ratio`.
-
-    Raises:
-        ValueError: As :func:`contact_estimate`, or if the poses are not finite or not those of this robot's nodes.
-        TypeError: As :func:`contact_estimate`.
-    """
-    check_instance("nominal", nominal, Equilibrium, "take one of a solver of the plane")
-    nodes = check_array("nodes", nodes, nominal.nodes.shape, -LARGEST, LARGEST, "finite")
-    motion = shape_motion(nominal.robot, nodes, *_cable_and_length(nominal))
-    return _estimate(nominal, motion, tension, rigidity_ratio)
-
-
-def _cable_and_length(nominal: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
-    return np.array(nominal.cable_mm), np.array(nominal.length_mm)
-
-
-def _estimate(nominal: Equilibrium, motion: Motion, tension: float, rigidity_ratio: float) -> np.ndarray:
-    tensions = np.array([check_finite("tension", tension)])
-    ratio = np.array(check_positive("rigidity_ratio", rigidity_ratio))
-    factor = force_factor(nominal.robot, motion, point_forces(nominal), tensions, ratio)
-    return np.asarray(factor * nominal.forces)
-
-
 def point_forces(equilibrium: Equilibrium) -> np.ndarray:
     """Return the force of each obstacle on each point of the robot, by energy, ``(m, p, k, 2)`` [N].
 
@@ -218,7 +172,7 @@ def free_motion(robot: Robot, cable_mm: np.ndarray, length_mm: np.ndarray) -> Mo
 
     Raises:
         ValueError: If a displacement is beyond what any robot of these disks can take up, or a length not from half to
-            twice the robot's.
+            twice the robot's, or the robot does not bend evenly.
         TypeError: If the robot is not one of the plane.
     """
     cable_mm, length_mm = _check_measured(robot, cable_mm, length_mm)
@@ -254,8 +208,8 @@ def shape_motion(robot: Robot, nodes: np.ndarray, cable_mm: np.ndarray, length_m
     ahead, angles = np.diff(nodes[..., :2], axis=-2), -np.diff(nodes[..., 2], axis=-1)
     length, pull = length_mm[..., None] / robot.segments, cable_mm[..., None] / robot.segments
     if robot.model == "rod":
-        stretch = _sinc_slope(angles / 2) / (2 * np.sinc(angles / (2 * np.pi)))  # c'/c, of the chord in the angle
-        taken = robot.offset_mm * np.cos(angles / 2) - length * _sinc_slope(angles / 2) / 2
+        stretch = sinc_slope(angles / 2) / (2 * np.sinc(angles / (2 * np.pi)))  # c'/c, of the chord in the angle
+        taken = robot.offset_mm * np.cos(angles / 2) - length * sinc_slope(angles / 2) / 2
         turns = np.broadcast_to(1 / taken.sum(axis=-1, keepdims=True), angles.shape)
     else:
         bisector = nodes[..., :-1, 2] - angles / 2
@@ -265,12 +219,17 @@ def shape_motion(robot: Robot, nodes: np.ndarray, cable_mm: np.ndarray, length_m
         turns = (length - pull) / (robot.segments * robot.offset_mm * np.cos(angles / 2) * cable)
     energy_scale = robot.rigidity / (2 * length[..., 0])
     tensions = 2 * energy_scale * np.sum(angles * turns, axis=-1)
-    return Motion(nodes, _node_slopes(ahead, stretch * turns, turns)[..., None, :, :], tensions[..., None])
+    return Motion(nodes, node_slopes(ahead, stretch * turns, turns)[..., None, :, :], tensions[..., None])
 
 
 def _check_measured(robot: Robot, cable_mm: np.ndarray, length_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return displacements of the cable and lengths of a robot as arrays; both may be noisy, and beyond its range."""
     check_instance("robot", robot, Robot, "the motions are those of robots of the plane")
+    if not robot.bends_evenly:
+        raise ValueError(
+            "the closed form is that of a robot that one cable to its tip bends evenly; contact_estimate and "
+            "shape_estimate take any robot"
+        )
     low, high = robot.shortest_mm / 2, 2 * robot.longest_mm
     length_mm = check_array("length_mm", length_mm, (...,), low, high, f"from {low:.6g} to {high:.6g}")
     most = min(robot.longest_mm, 2 * robot.segments * robot.offset_mm)
@@ -297,7 +256,7 @@ def _check_flags(name: str, value: object) -> np.ndarray:
     return flags
 
 
-def _node_slopes(ahead: np.ndarray, stretch: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def node_slopes(ahead: np.ndarray, stretch: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Return the slopes of node poses whose segments stretch and whose disks turn against each other."""
     slopes = np.zeros((*turns.shape[:-1], turns.shape[-1] + 1, 3))
     slopes[..., 1:, 2] = -np.cumsum(turns, axis=-1)
@@ -315,10 +274,10 @@ def _free_segment(robot: Robot, pull: np.ndarray, length: np.ndarray) -> tuple[n
     half = pull / (2 * offset)
     for _ in range(NEWTON_ITERATIONS):
         taken = length * (1 - np.sinc(half / np.pi)) + 2 * offset * np.sin(half)
-        half = half - (taken - pull) / (2 * offset * np.cos(half) - length * _sinc_slope(half))
+        half = half - (taken - pull) / (2 * offset * np.cos(half) - length * sinc_slope(half))
     return 2 * half, length * np.sinc(half / np.pi)
 
 
-def _sinc_slope(half: np.ndarray) -> np.ndarray:
+def sinc_slope(half: np.ndarray) -> np.ndarray:
     """Return the derivative of sin h / h."""
     return np.asarray((np.cos(half) - np.sinc(half / np.pi)) / np.where(half == 0, 1.0, half))

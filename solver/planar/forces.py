@@ -110,10 +110,15 @@ class VirtualWork:
         """Return the estimated contact force, ``(m, 2)`` [N].
 
         Raises:
-            ValueError: If ``fit_range_mm`` is outside the robot's range.
+            ValueError: If ``fit_range_mm`` is outside the robot's range, or the robot does not bend evenly.
             TypeError: If ``equilibrium`` is not one of the plane.
         """
         check_instance("equilibrium", equilibrium, Equilibrium, "take one of a solver of the plane")
+        if not equilibrium.robot.bends_evenly:
+            raise ValueError(
+                "the slopes of eq. 7 are those of a robot that one cable to its tip bends evenly; contact_estimate and "
+                "shape_estimate take any robot"
+            )
         slopes = equilibrium.tip_slopes
         if self.fit_range_mm:
             slopes = fitted_slopes(equilibrium.robot.at(equilibrium.length_mm), *self.fit_range_mm)

@@ -91,9 +91,15 @@ class SpatialVirtualWork:
         """Return the estimated contact force, ``(m, 3)`` [N].
 
         Raises:
+            ValueError: If the robot is a rod, whose free tip has no slopes in closed form.
             TypeError: If ``equilibrium`` is not one in space.
         """
         check_instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
+        if equilibrium.robot.model == "rod":
+            raise ValueError(
+                "model is 'rod'; the slopes of the free tip are those of model=\"paper\": an environment estimates the "
+                'force on a rod, info["force_est"]'
+            )
         slopes = equilibrium.tip_slopes
         forces = with_friction(equilibrium.forces, slopes[:, :3], self.friction)
         loads = sides(equilibrium.cables_mm) * equilibrium.tensions - equilibrium.onset_tensions

@@ -12,7 +12,7 @@ import ccr_gym
 from agents.policy import search
 from ccr_gym import FORCE_SPAN, PushObstacleEnv
 from ccr_gym.reward import TERMS
-from solver import Circle, Scene, Status
+from solver import Cable, Circle, Robot, Scene, Status
 
 EVERY_ID = pytest.mark.parametrize("env_id", sorted(ccr_gym.ENV_IDS))
 EVERY_MODE = pytest.mark.parametrize("obs_mode", ["dict", "flat"])
@@ -205,3 +205,26 @@ def test_the_reference_backend_agrees():
     assert native_info["force_true"].any()
     assert reference_info["force_true"] == pytest.approx(native_info["force_true"], rel=1e-4)
     assert reference_info["force_est"] == pytest.approx(native_info["force_est"], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"weight_per_length": (4e-4, 0.0)},
+        {"segment_rigidity": (6000.0,) * 9 + (4000.0,) * 9},
+        {"cables": (Cable(offset_mm=6.0),)},
+    ],
+    ids=["weight", "unlike segments", "nearer cable"],
+)
+def test_robots_that_do_not_bend_evenly_are_pulled_to_contact_and_estimated(changes):
+    """Like the prototype: a full pull brings them to the obstacle, and eq. 11 is off by no more than with it."""
+    env = make("CCR/PushObstacle-v1", robot=Robot.prototype(**changes), estimator="paper")
+    env.reset(seed=0)
+    ratios = []
+    for _ in range(30):
+        *_, info = env.step(env.action_space.high)
+        force = np.linalg.norm(info["force_true"])
+        if force > 0.1:
+            ratios.append(np.linalg.norm(info["force_est"]) / force)
+    assert len(ratios) >= 3
+    assert 0.5 < np.median(ratios) < 1.5

@@ -219,9 +219,9 @@ def _reason(solver, taken, k, repeats=REPEATS):
     squeeze the robot, with contact forces that no cable causes by pulling: the command feeds or draws it, or a cable of
     the paper's models pushes it, into a place that is too narrow, and these models set no limit to that. ``wedged``: no
     repeat moves on any more, and by the slopes of the closed gaps alone no motion does. ``holes meet``: two holes
-    of a taut cable do, where its length has no slope. ``buckled``: the work of one step is spent while cables, which no
-    limit stops before, pull against each other so much that segments bend to and fro, from pattern to pattern in many
-    small snaps.
+    of a taut cable do, where its length has no slope. ``buckled``: cables, which no limit stops before, pull
+    against each other so much that segments bend to and fro, from pattern to pattern in many small snaps, or that no
+    shape is stable.
     """
     state, command, robot = taken.states[k + 1], taken.commands[k], solver.robot
     reason = "work" if state.factorizations > WORK else _trace(solver, taken.states[k], command).reason
@@ -233,7 +233,7 @@ def _reason(solver, taken, k, repeats=REPEATS):
         return near_zero
     softest = min(robot.segment_rigidity or [robot.rigidity]) if robot.model == "rod" else robot.rigidity
     buckling = 12 * softest * (robot.segments / state.length_mm) ** 2
-    if robot.model == "rod" and reason == "work" and state.tensions.sum() > BUCKLED * buckling:
+    if robot.model == "rod" and state.tensions.sum() > BUCKLED * buckling:
         return "buckled"
     if repeats == 0:
         return "not looked at"

@@ -24,6 +24,7 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   const bool held = highest(tensions_) <= problem_.robot().max_tension;  // at the start
   descent_start_ = present_;
   descent_kept_ = problem_.kept_tensions();
+  last_yielded_ = -1;
   for (int k = 0; motors_yield_ && k < static_cast<int>(layout_.cables.size); ++k)
     if (problem_.keeps_tension(k) && command.cables[k] < present_.command.cables[k]) hold_length(k);
   if (!bends_evenly_ && !problem_.touches_obstacle(present_.active)) {
@@ -39,8 +40,9 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   constexpr int kIterations = Model::kRod ? kDescentIterations : kShearingIterations;
   for (int i = 0; i < kIterations && moved && !work_is_spent(); ++i) {
     std::swap(present_, trial_);
-    record_shape();
-    if (hold_beyond(ceiling) && !newton_.set_metric(present_)) break;
+    const bool returned = hold_first_beyond(ceiling);
+    if (!returned) record_shape();
+    if ((returned || hold_beyond(ceiling)) && !newton_.set_metric(present_)) break;
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton(ceiling);
     const bool strides = !Model::kRod && i >= kLongDescent;
     const bool ended = finished || descend_once(strides ? kDescentStride : kDescentCap, ceiling, moved);
@@ -83,9 +85,37 @@ bool ModelContinuation<Model>::hold_beyond(const Command& ceiling) {
   return holds;
 }
 
+// Where several of these cables have come in beyond a ceiling since the iterate before, `trial_`: goes back to that and
+// lets the motor hold the one that gets there first. All of them together might lock the robot. False where no more
+// than one has.
+template <class Model>
+bool ModelContinuation<Model>::hold_first_beyond(const Command& ceiling) {
+  if constexpr (Model::kRod) {
+    Tensions beyond{};
+    const auto excess = [&](int k) { return problem_.taken(k) - ceiling.cables[k]; };
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+      if (problem_.keeps_tension(k) && excess(k) > follow_tolerance()) beyond[k] = excess(k);
+    if (std::count_if(beyond.v.begin(), beyond.v.end(), [](double by) { return by > 0; }) < 2) return false;
+    std::swap(present_, trial_);
+    problem_.evaluate(present_);
+    int first = 0;
+    double least = HUGE_VAL;  // room before the ceiling, over what was gone beyond it
+    for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
+      if (beyond[k] > 0 && -excess(k) < least * beyond[k]) {
+        least = -excess(k) / beyond[k];
+        first = k;
+      }
+    problem_.keep_tension(first, HUGE_VAL);
+    present_.command.cables[first] = ceiling.cables[first];
+    return true;
+  }
+  return false;
+}
+
 // Lets the motor keep the limit at the end of a descent, `present_`, that would have to hold most beyond it, up to
-// where its cable is: one by one, as those that pull against each other relieve each other. The tensions of an iterate
-// that is no equilibrium, where steps are damped, mean nothing. False where there is none.
+// where its cable is: one by one, as those that pull against each other relieve each other. Where it comes to the same
+// shape again, because those that were let out have come in as far as they may, only the last one is let out. The
+// tensions of an iterate that is no equilibrium, where steps are damped, mean nothing. False where there is none.
 template <class Model>
 bool ModelContinuation<Model>::yield_at_limit(Command& ceiling) {
   if constexpr (Model::kRod) {
@@ -96,11 +126,12 @@ bool ModelContinuation<Model>::yield_at_limit(Command& ceiling) {
       const int contact = active.contact[j];
       if (!problem_.is_slack(contact) || active.multiplier[j] <= most || let_out_[contact - problem_.contacts()])
         continue;
-      most = active.multiplier[j];
+      most = contact - problem_.contacts() == last_yielded_ ? HUGE_VAL : active.multiplier[j];
       place = j;
     }
     if (place < 0) return false;
     const int cable = active.contact[place] - problem_.contacts();
+    last_yielded_ = cable;
     ceiling.cables[cable] = present_.command.cables[cable];
     problem_.keep_tension(cable, below_limit());
     active.drop(place);

@@ -325,6 +325,7 @@ bool ModelContinuation<Model>::pass_with_limit(const Command& target) {
   template void ModelContinuation<Model>::hold_length(int);                                                            \
   template bool ModelContinuation<Model>::is_met(const Command&, Status);                                              \
   template bool ModelContinuation<Model>::pass_with_limit(const Command&);                                             \
+  template double ModelContinuation<Model>::follow_tolerance() const;                                                  \
   template double ModelContinuation<Model>::below_limit() const;                                                       \
   template void ModelContinuation<Model>::hold_lengths(const Command&);                                                \
   template void ModelContinuation<Model>::add_tension(int, double, ActiveSet&) const;                                  \

@@ -188,6 +188,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   // The descent after the end of a branch.
   End descend_from_end(const Command& command, Command ceiling);
   bool hold_beyond(const Command& ceiling);
+  bool hold_first_beyond(const Command& ceiling);
   bool yield_at_limit(Command& ceiling);
   End finish_descent(bool motor_holds, bool held);
   End undo_descent(End end);
@@ -243,6 +244,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   std::size_t descent_trace_ = 0;
   bool motors_yield_ = false;  // whether those that would have to hold more than the limit let their cables out on it
   Tensions descent_kept_{};    // tensions that motors kept there
+  int last_yielded_ = -1;      // the cable that a motor let out last on it
 };
 
 // The largest of some numbers.

@@ -73,7 +73,27 @@ bool Newton<Model>::factor_stable(const ActiveSet& active, int penalties) {
   return factor_penalized(active, penalties) && qp_.is_stable(problem, kkt_, active);
 }
 
-// The same, with damping as the last resort: it shortens the step.
+// Whether an equilibrium to which no step led is stable, as it was before: loads may have grown, or bear on a longer
+// robot. Gaps that are closed without being pressed hold it as the active ones do. Where these depend on each other, as
+// those of cables that lock a robot between them, no motion that satisfies them to first order leads away, and a
+// descent would find none: it counts as held. In space a robot that gives way to a load along it may turn about that
+// for nothing, and no place is stable: it stands until it is pulled aside.
+template <class Model>
+bool Newton<Model>::stands(const ActiveSet& active) {
+  if (Model::kSpace == 3 || !problem.has_loads()) return true;
+  ActiveSet held = active;
+  for (const int contact : problem.near_contacts()) {
+    const auto begin = held.contact.begin(), end = begin + held.count;
+    const bool closed = problem.gaps()[contact] <= kFeasibility * problem.robot().max_length;
+    if (!closed || held.count == kMaxActive || std::find(begin, end, contact) != end) continue;
+    held.contact[held.count] = contact;
+    held.multiplier[held.count++] = 0;
+  }
+  const int count = held.count;
+  return factor_penalized(held, kPenalties) && (qp_.balance(problem, kkt_, held, step_) || held.count < count);
+}
+
+// The same as `factor_stable`, with damping as the last resort: it shortens the step.
 template <class Model>
 bool Newton<Model>::factor_convexified(const ActiveSet& active, int penalties) {
   return factor_stable(active, penalties) || factor_damped(active);
@@ -163,7 +183,8 @@ NewtonResult Newton<Model>::solve(Iterate& at, int damped) {
   for (; result.iterations <= kNewtonIterations; ++result.iterations) {
     problem.reduced_gradient(at.active);
     if (is_equilibrium(at.active)) {
-      result.converged = stable || factor_stable(at.active, kPenalties);
+      const bool took_steps = result.iterations > 0;
+      result.converged = took_steps ? stable || factor_stable(at.active, kPenalties) : stands(at.active);
       return result;
     }
     ActiveSet target = at.active;

@@ -80,6 +80,7 @@ class Newton {
   bool slide_along(const ActiveSet& active, ActiveSet& target);
   bool factor_penalized(const ActiveSet& active, int penalties);
   bool factor_stable(const ActiveSet& active, int penalties);
+  bool stands(const ActiveSet& active);
   bool factor_convexified(const ActiveSet& active, int penalties);
   bool factor_damped(const ActiveSet& active);
   bool factor_definite();

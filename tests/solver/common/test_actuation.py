@@ -71,6 +71,24 @@ def test_commands_are_cables_where_nothing_opposes():
     assert pairs.steady(np.array([1.0, 0.0])) == pytest.approx([1.0, math.cos(2.0)])
 
 
+@pytest.mark.parametrize("side", [0.0, math.pi])
+def test_a_single_cable_nearer_than_the_offset_reaches_what_was_commanded(side):
+    actuation = Actuation.of(Robot.prototype(cables=(Cable(angle=side, offset_mm=6.0),)), 2)
+    command = np.array([4.0 * math.cos(side)])
+    cables = actuation.cables_mm(command)
+    assert cables == pytest.approx([3.0])
+    assert actuation.reached(command, cables) == pytest.approx(command)
+    assert actuation.cables_mm(actuation.reached(command, cables - 0.5)) == pytest.approx(cables - 0.5)
+
+
+def test_a_single_cable_in_space_reaches_the_commands_of_both_axes():
+    actuation = Actuation.of(SpatialRobot.prototype(cables=(Cable(angle=0.5),)), 3)
+    commands = np.array([1.0, 0.5])
+    cables = actuation.cables_mm(commands)
+    assert actuation.reached(commands, cables).tolist() == commands.tolist()
+    assert actuation.cables_mm(actuation.reached(commands, cables - 0.1)) == pytest.approx(cables - 0.1)
+
+
 @pytest.mark.parametrize("name", SURROUNDED)
 def test_the_work_of_tensions_is_that_of_the_cables(name):
     robot = SpatialRobot.preset(name)

@@ -96,3 +96,30 @@ def test_no_rest_where_paying_out_as_far_as_allowed_does_not_help(kind):
     robot = replace(loaded("prototype", kind), max_cable_mm=0.1, cables=(Cable(), Cable(angle=np.pi)))
     with pytest.raises(ValueError, match=r"its cables paid out to -0\.1 mm at most"):
         rest(robot, 0.1 * rest(robot, np.inf, kind).tensions.max(), kind)
+
+
+@pytest.mark.parametrize("share", [4.5, 9.0, 30.0])
+def test_a_robot_in_line_with_a_load_that_buckles_it_falls_over(share):
+    """Its cable keeps the tip upright on one side, where Euler's load is four times the cantilever's."""
+    euler = np.pi**2 * 5000 / (4 * 180**2)
+    state = rest(Robot.prototype(loads=(Load(node=18, force=(0.0, -share * euler)),)), np.inf, "plane")
+    aside = rest(Robot.prototype(loads=(Load(node=18, force=(1e-4, -share * euler)),)), np.inf, "plane")
+    assert state.status is Status.SNAPPED
+    assert unbalanced(state) < 1e-8
+    assert state.nodes == pytest.approx(aside.nodes, abs=0.02)
+
+
+def test_a_column_stands_up_to_the_length_at_which_its_weight_buckles_it():
+    """Greenhill: w L³ = 7.837 EI; both cables are paid out."""
+    weight = 7.837 * 5000 / 100**3
+    pair = (Cable(), Cable(angle=np.pi))
+    robot = Robot.prototype(length_mm=50.0, length_range_mm=(20, 200), weight_per_length=(0.0, -weight), cables=pair)
+    solver = Solver(robot, Scene())
+    state = solver.step(solver.rest(), (-5.0, -5.0))
+    for length in (80.0, 99.0):
+        state = solver.step(state, (-5.0, -5.0), length)
+        assert state.status is Status.CONVERGED
+        assert state.nodes[-1, 0] == pytest.approx(0.0, abs=1e-9)
+    state = solver.step(state, (-5.0, -5.0), 101.0)
+    assert state.status is Status.SNAPPED
+    assert abs(state.nodes[-1, 0]) > 5

@@ -8,15 +8,14 @@ import pytest
 
 from solver import Circle, Ellipse, HalfPlane, Polygon, Robot, Scene, Solver, VirtualWork, free_motion
 from solver.common.robot import MODELS
+from solver.planar.contact_force import contact_estimate, shape_estimate
 from solver.planar.estimators import (
     LEAST_SLOPE,
     SPREAD,
     Motion,
     RigidityFit,
-    contact_estimate,
     force_factor,
     point_forces,
-    shape_estimate,
     shape_motion,
 )
 from solver.planar.forces import force_true

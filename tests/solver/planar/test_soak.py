@@ -115,3 +115,10 @@ def test_a_robot_whose_disks_meet_at_a_corner_is_wedged():
     assert cases == []
     assert tally.blocked == 3
     assert tally.blocked_unconfirmed == 0
+
+
+def test_opposed_cables_that_have_come_in_as_far_as_they_may_are_let_out_again_one_at_a_time():
+    """Let out together, they came in together and locked the robot again, until the work of the step was spent."""
+    tally, cases = play(Episode("pair", 1190, 347, 500))
+    assert cases == []
+    assert tally.statuses["GAVE_UP"] == 0

@@ -5,7 +5,7 @@ import pytest
 
 from solver import HalfPlane, Robot, Scene, Solver
 from solver.planar.forces import VirtualWork
-from solver.spatial import HalfSpace, SpatialSolver, Sphere
+from solver.spatial import HalfSpace, SpatialRobot, SpatialSolver, Sphere
 from solver.spatial.forces import SpatialVirtualWork, force_true, with_friction
 
 SPHERE = Sphere(center=(40, 18, 104), radius=15)
@@ -88,3 +88,9 @@ def test_nothing_is_estimated_where_nothing_touches(robot, walk):
     free = walk(SpatialSolver(robot, Scene([SPHERE])), [(1.0, 1.0)])
     assert not SpatialVirtualWork(0.2).estimate(free).any()
     assert not free.onset_tensions.any()
+
+
+def test_the_estimate_refuses_a_rod():
+    rest = SpatialSolver(SpatialRobot.prototype(), Scene([SPHERE])).rest()
+    with pytest.raises(ValueError, match=r"model is 'rod'; .* model=\"paper\""):
+        SpatialVirtualWork().estimate(rest)

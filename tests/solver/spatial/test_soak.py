@@ -47,6 +47,13 @@ def test_a_long_descent_ends_where_a_segment_folds_over():
     assert tally.most_factorizations < 4000
 
 
+def test_of_cables_that_come_in_on_a_descent_the_first_to_get_as_far_as_it_may_is_held():
+    """Held together, five of them locked the robot again and again, until the work of the step was spent."""
+    tally, cases = play(Episode("space rod", 1190, 995, 500))
+    assert cases == []
+    assert tally.statuses["GAVE_UP"] == 0
+
+
 def test_a_robot_that_no_limit_stops_is_blocked_where_its_tension_has_risen_beyond_what_moves_it():
     """Each repeat of the command spent the work of a step at 140 EI/(aL), on descents in ever finer sub-steps."""
     setting, generator = setting_of(Episode("space rod", 1170, 1225, 500))
