@@ -40,9 +40,9 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   constexpr int kIterations = Model::kRod ? kDescentIterations : kShearingIterations;
   for (int i = 0; i < kIterations && moved && !work_is_spent(); ++i) {
     std::swap(present_, trial_);
-    const bool returned = hold_first_beyond(ceiling);
-    if (!returned) record_shape();
-    if ((returned || hold_beyond(ceiling)) && !newton_.set_metric(present_)) break;
+    const bool held_one = hold_first_beyond(ceiling);
+    record_shape();
+    if ((held_one || hold_beyond(ceiling)) && !newton_.set_metric(present_)) break;
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton(ceiling);
     const bool strides = !Model::kRod && i >= kLongDescent;
     const bool ended = finished || descend_once(strides ? kDescentStride : kDescentCap, ceiling, moved);
@@ -85,9 +85,9 @@ bool ModelContinuation<Model>::hold_beyond(const Command& ceiling) {
   return holds;
 }
 
-// Where several of these cables have come in beyond a ceiling since the iterate before, `trial_`: goes back to that and
-// lets the motor hold the one that gets there first. All of them together might lock the robot. False where no more
-// than one has.
+// Where several of these cables have come in beyond a ceiling since the iterate before, `trial_`: goes from that only
+// as far as the one that gets there first, and lets its motor hold it. All of them together might lock the robot. False
+// where no more than one has, or where that leads nowhere.
 template <class Model>
 bool ModelContinuation<Model>::hold_first_beyond(const Command& ceiling) {
   if constexpr (Model::kRod) {
@@ -96,7 +96,8 @@ bool ModelContinuation<Model>::hold_first_beyond(const Command& ceiling) {
     for (int k = 0; k < static_cast<int>(layout_.cables.size); ++k)
       if (problem_.keeps_tension(k) && excess(k) > follow_tolerance()) beyond[k] = excess(k);
     if (std::count_if(beyond.v.begin(), beyond.v.end(), [](double by) { return by > 0; }) < 2) return false;
-    std::swap(present_, trial_);
+    back_ = present_;
+    present_ = trial_;
     problem_.evaluate(present_);
     int first = 0;
     double least = HUGE_VAL;  // room before the ceiling, over what was gone beyond it
@@ -105,9 +106,15 @@ bool ModelContinuation<Model>::hold_first_beyond(const Command& ceiling) {
         least = -excess(k) / beyond[k];
         first = k;
       }
+    const double kept = problem_.kept_tensions()[first];
+    Command held = present_.command;
+    held.cables[first] = ceiling.cables[first];
     problem_.keep_tension(first, HUGE_VAL);
-    present_.command.cables[first] = ceiling.cables[first];
-    return true;
+    const bool leads_on = newton_.set_metric(present_) && restore_at(held, true);
+    present_ = leads_on ? trial_ : back_;
+    if (!leads_on) problem_.keep_tension(first, kept);
+    problem_.evaluate(present_);
+    return leads_on;
   }
   return false;
 }

@@ -54,6 +54,13 @@ def test_of_cables_that_come_in_on_a_descent_the_first_to_get_as_far_as_it_may_i
     assert tally.statuses["GAVE_UP"] == 0
 
 
+def test_a_cable_that_is_held_on_a_descent_is_one_that_has_come_in_so_far():
+    """Two cables in one direction come in together, and neither can be held where both are not yet."""
+    tally, cases = play(Episode("space rod", 1195, 965, 500))
+    assert cases == []
+    assert tally.statuses["GAVE_UP"] == 0
+
+
 def test_a_robot_that_no_limit_stops_is_blocked_where_its_tension_has_risen_beyond_what_moves_it():
     """Each repeat of the command spent the work of a step at 140 EI/(aL), on descents in ever finer sub-steps."""
     setting, generator = setting_of(Episode("space rod", 1170, 1225, 500))
