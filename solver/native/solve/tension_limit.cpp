@@ -48,14 +48,14 @@ bool ModelContinuation<Model>::peaks_at_limit(const Command& goal, double remain
   return try_command(between(present_.command, goal, std::min(1.0, kPeakStep / remaining))) == Move::kOverTension;
 }
 
-// Whether cables stall where they are, since those at the limit of their tension tighten at once: a longer sub-step
-// could end behind a peak that is lower than the work of the cables shows.
+// Whether cables stall where they are, since those at the limit of their tension tighten at once: among several of a
+// rod, a longer sub-step could end behind a peak that is lower than the work of the cables shows.
 template <class Model>
 bool ModelContinuation<Model>::stalls_at_once(const Command& goal, double remaining) {
   const Command& here = present_.command;
   if (!is_at_tension_limit() || !pulls_cable(goal) || goal.length != here.length || moves_obstacles(goal)) return false;
   if (layout_.cables.size == 1) return true;
-  if (problem_.keeps_tensions() ||
+  if (!Model::kRod || problem_.keeps_tensions() ||
       try_command(between(here, goal, std::min(1.0, kProbe / remaining))) == Move::kRejected)
     return false;
   const double limit = problem_.robot().max_tension;
