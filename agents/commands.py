@@ -4,7 +4,7 @@ import contextlib
 import io
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, get_args
 
 import tyro
 
@@ -35,6 +35,7 @@ Command = (
     | Annotated[EstimateConfig, tyro.conf.subcommand("estimate")]
     | Annotated[PlayConfig, tyro.conf.subcommand("play")]
 )
+NAMES = tuple(kind.__metadata__[0].name for kind in get_args(Command))
 
 
 def run() -> None:
@@ -69,6 +70,8 @@ def parse(arguments: Sequence[str] | None = None) -> Command:
     if given[:1] == ["--version"]:
         print(f"ccr-gym {__version__}")
         raise SystemExit
+    if given and not given[0].startswith("-") and given[0] not in NAMES:
+        raise UserError(f"there is no command {given[0]!r}; it must be one of {', '.join(NAMES)}; see ccr-gym --help")
     settings = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.conf.CascadeSubcommandArgs)
     written = io.StringIO()
     try:

@@ -165,7 +165,8 @@ def _number(path: Path, row: int, name: str, cell: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= MOST:
-        raise UserError(f"{path}, line {row}, column {name}: {cell[:40]!r} is not a number up to {MOST:g} in size")
+        what = f"{cell[:40]!r} is not a number up to {MOST:g} in size" if cell.strip() else "the cell is empty"
+        raise UserError(f"{path}, line {row}, column {name}: {what}")
     return value
 
 

@@ -58,14 +58,15 @@ def _obstacle(value: object, what: str, planar: bool) -> Obstacle:
     if not (isinstance(shape, str) and shape in known):
         raise ValueError(f"shape of {what} is {shape!r}; it must be one of {', '.join(known)}")
     kind: Any = getattr(solver if planar else spatial, shape)
-    check_names(given, [field.name for field in fields(kind)], f"{what}, a {shape}")
+    named = f"{'an' if shape[0] in 'AEIOU' else 'a'} {shape}"
+    check_names(given, [field.name for field in fields(kind)], f"{what}, {named}")
     for field in fields(kind):
         if field.default is MISSING and field.name not in given:
-            raise ValueError(f"{field.name} of {what}, a {shape}, is missing")
+            raise ValueError(f"{field.name} of {what}, {named}, is missing")
     try:
         obstacle: Obstacle = kind(**given)
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{what}, a {shape}: {error}") from error
+        raise ValueError(f"{what}, {named}: {error}") from error
     return obstacle
 
 

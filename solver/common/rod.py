@@ -288,7 +288,7 @@ def check_cables(robot: AnyRobot, name: str, cables_mm: object) -> tuple[float, 
     bound = f"from {low:.6g} to {high:.6g} (robot.max_cable_mm)"
     if count == 1 and not is_listed(cables_mm):
         return (check_number(name, cables_mm, low, high, bound),)
-    bound = f"{count} numbers, {bound}"
+    bound = f"{count} number{'s' * (count > 1)}, {bound}"
     entries = check_sequence(name, cables_mm, bound)
     if len(entries) != count:
         raise refusal(name, cables_mm, bound)

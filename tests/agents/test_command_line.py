@@ -58,7 +58,7 @@ def test_arguments_of_other_commands_stay_where_they_are():
     ("line", "message"),
     [
         ("", r"expected one of \{train, .*, play\}; see ccr-gym --help"),
-        ("bogus", "unrecognized options: bogus; see ccr-gym --help"),
+        ("bogus", "there is no command 'bogus'; it must be one of train, .*, play; see ccr-gym --help"),
         ("train --setps 9", r"unrecognized .*--setps.*; perhaps you meant --steps of ccr-gym train.*; see .*--help"),
         ("train --steps", "missing value for argument '--steps'.*; see ccr-gym train.* --help"),
         ("train --steps abc", "error parsing --steps: invalid literal for .*'abc'; see ccr-gym train --help"),

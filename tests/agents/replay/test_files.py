@@ -106,6 +106,7 @@ def test_what_is_wrong_with_a_robot_is_one_line(text, message, tmp_path):
         ('[{"shape": "Custom"}]', "shape of obstacle 0 is 'Custom'"),
         ('[{"shape": "__class__"}]', "shape of obstacle 0 is '__class__'"),
         ('[{"shape": "Circle", "center": [60, 90]}]', "radius of obstacle 0, a Circle, is missing"),
+        ('[{"shape": "Ellipse", "center": [60, 90]}]', "radii of obstacle 0, an Ellipse, is missing"),
         ('[{"shape": "Circle", "center": [60], "radius": 15}]', "obstacle 0, a Circle: center"),
         (
             '[{"shape": "Circle", "center": [60, 90], "radius": 15, "r": 1}]',

@@ -55,7 +55,7 @@ def test_nodes_and_the_tip_in_space(path):
         ("cable_mm;tension_n\n1,5;2,0\n", "cells are separated by semicolons; they must be separated by commas"),
         ("cable_mm\ttension_n\n1\t2\n", "cells are separated by tabs; they must be separated by commas"),
         ("cable_mm,tension_n\n1,2\n1\n", "line 3: there are 1 cells; the header has 2"),
-        ("cable_mm,tension_n\n1,2\n1,\n", "line 3, column tension_n: '' is not a number"),
+        ("cable_mm,tension_n\n1,2\n1,\n", "line 3, column tension_n: the cell is empty"),
         ("cable_mm,tension_n\n1,=cmd()\n", "line 2, column tension_n: '=cmd()' is not a number"),
         ("cable_mm,tension_n\n1,nan\n", "line 2, column tension_n: 'nan' is not a number"),
         ("cable_mm,tension_n\n1,1e400\n", "line 2, column tension_n: '1e400' is not a number"),
