@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from agents.arguments import LARGEST, check_real
-from agents.environment import Environment, require_entries, require_env
+from agents.environment import Environment, require_entries, require_env, require_reset
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search
 from agents.tuned import P_GAINS, PI_GAINS, tuned_gains
@@ -63,6 +63,7 @@ class ForceController:
 
         Raises:
             ValueError: If there is no environment.
+            TypeError: If it is none of ccr_gym, or several.
         """
         self._last = None
         settings = require_env(env).get_wrapper_attr("settings")
@@ -72,8 +73,10 @@ class ForceController:
         """Return the search action until something touches, then control the force.
 
         Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
             ValueError: If the observation is none of ``obs_mode="dict"``.
         """
+        require_reset(self)
         require_entries(observation)
         force = float(self._estimator.update_one(observation).force)
         if not observation["contact"].any():

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from agents.arguments import check_kind
-from agents.environment import Environment, require_entries, require_env
+from agents.environment import Environment, require_entries, require_env, require_reset
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, search, set_points
 from agents.tuned import MPCSettings
@@ -50,6 +50,7 @@ class PredictiveController:
 
         Raises:
             ValueError: If there is no environment.
+            TypeError: If it is none of ccr_gym, or several.
         """
         self._env = require_env(env)
         self._estimator = RobotEstimator(self._env.get_wrapper_attr("settings"), 1)
@@ -61,8 +62,10 @@ class PredictiveController:
         """Return the search action until something touches, then the first move of a plan.
 
         Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
             ValueError: If the observation is none of ``obs_mode="dict"``.
         """
+        require_reset(self)
         require_entries(observation)
         direction, settings = search(observation), self._env.get_wrapper_attr("settings")
         span, travel = settings.actuation.sections**3, settings.scales.travel_mm

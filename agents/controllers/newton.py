@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import bisect
 
 from agents.arguments import check_real
-from agents.environment import Environment, require_entries, require_env
+from agents.environment import Environment, require_entries, require_env, require_reset
 from agents.estimation.robot import RobotEstimator
 from agents.policy import Observation, motor_actions, natural, search, set_points
 from agents.tuned import NEWTON_GAIN
@@ -61,6 +61,7 @@ class NewtonController:
 
         Raises:
             ValueError: If there is no environment.
+            TypeError: If it is none of ccr_gym, or several.
         """
         self._env = require_env(env)
         self._actions = self._env.get_wrapper_attr("action_spec")
@@ -70,8 +71,10 @@ class NewtonController:
         """Return the search action until something touches, then a step to the force of the set-point.
 
         Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
             ValueError: If the observation is none of ``obs_mode="dict"``.
         """
+        require_reset(self)
         require_entries(observation)
         scales = self._env.get_wrapper_attr("settings").scales
         known = state = natural(self._env.get_wrapper_attr("privileged_state"), scales)

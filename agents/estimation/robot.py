@@ -11,6 +11,7 @@ from agents.estimation.candidates import ALL, Candidates, Loops
 from agents.estimation.force import SATURATED, ForceFilter, Work
 from agents.estimation.inputs import check_observation, check_robots, entry_sizes
 from agents.estimation.lever import LEAST_LEVER, BentLevers
+from agents.estimation.rest import AT_REST, RestingShape
 from agents.estimation.shape import observed_commands, observed_ratios
 from agents.estimation.tension import Pulls, TensionFilter
 from ccr_gym import EXACT, Settings, SpatialSettings
@@ -21,7 +22,6 @@ PLAY_ERROR = 0.001  # standard deviation of a seen command that neither noise no
 RIGIDITY_ERROR = 0.01  # standard deviation of the nominal tension, over the tension
 LOSS_ERROR = 0.003  # likewise, of the share of friction
 TINY = 1e-6  # of a spread, where there is none
-AT_REST = 1e-6  # of a motor [a]
 SHARE_ERROR = 0.4  # standard deviation of an obstacle's share p of the force, over that of an event, √(p (1 − p))
 SHARE_CHANGE = 0.5  # likewise, over its change in a step
 MODEL_ERROR = 0.02  # standard deviation of virtual work over the force
@@ -89,12 +89,11 @@ class RobotEstimator:
         sensing = settings.sensors or EXACT
         candidates, commands = Candidates.of(sensing), settings.actuation.matrix.shape[1]
         self._candidates = candidates
-        limit = settings.robot.max_tension / settings.scales.tension_n
         self.loops = Loops(count, commands, candidates)
-        self._levers = BentLevers(settings)
+        self._rest, self._levers = RestingShape(settings, count), BentLevers(settings)
         self._slopes = np.zeros((count, commands))  # of the free tension over the motor
         gain = float(np.sqrt((settings.actuation.matrix**2).sum(axis=0).max()))
-        self._tension = TensionFilter(count, commands, candidates, sensing, limit, gain)
+        self._tension = TensionFilter(count, commands, candidates, sensing, _stall_forces(settings), gain)
         self._force = ForceFilter(count, sensing, int(candidates.latencies[-1]), settings.force_span)
         self._seen_std = max(SEEN * float(np.mean(sensing.angle_noise)), LEAST_SEEN)
         error = max(SEEN * float(np.mean(sensing.angle_error)), LEAST_SEEN)
@@ -114,6 +113,7 @@ class RobotEstimator:
         """
         check_robots(index, self._count)
         self.loops.reset(index)
+        self._rest.reset(index)
         self._tension.reset(index)
         self._force.reset(index)
         for part in (self._seen, self._share, self._slopes):
@@ -130,6 +130,7 @@ class RobotEstimator:
         motors = self._range * observation["cable"].astype(float)
         touching = np.asarray(observation["contact"].any(axis=1))
         self.loops.update(motors, index)
+        self._rest.update(motors, index)
         shape = self._update_shape(observation, index)
         places = self.loops.places[index, 0]
         pulls, free, levers = self._tensions(observation)
@@ -171,7 +172,9 @@ class RobotEstimator:
         """
         seen = observed_commands(observation, self._settings)
         *_, offset = observed_ratios(observation, self._settings)
-        places = self.loops.places[index][:, self._candidates.latencies] * (self._scale / offset)[:, None, None, None]
+        latencies = self._candidates.latencies
+        places = self._rest.shown(self.loops.places[index][:, latencies], latencies, index)
+        places = places * (self._scale / offset)[:, None, None, None]
         errors = seen[:, None, :, None] - places  # in units of the robot's own offset, as noise is one of angles
         counted = (self._tension.stalls[index] == 0)[:, None, None, None]
         for total, term in zip(self._sums, (errors, places, errors**2, places**2, errors * places), strict=True):
@@ -201,10 +204,11 @@ class RobotEstimator:
 
         A motor at 0 leaves its cable where the play ends, and tells nothing of the slope there: that before is kept.
         """
-        away = np.abs(motors) > AT_REST
-        slopes = np.where(away, free / np.where(away, motors, 1.0), self._slopes[index])
+        pulled = self._rest.pulled(motors[..., None])[..., 0]
+        away = np.abs(pulled) > AT_REST
+        slopes = np.where(away, free / np.where(away, pulled, 1.0), self._slopes[index])
         self._slopes[index] = slopes
-        return np.asarray(slopes[..., None] * places)
+        return np.asarray(slopes[..., None] * self._rest.pulled(places))
 
     def _virtual_work(
         self, pulls: Pulls, nominal: np.ndarray, levers: np.ndarray, weights: np.ndarray, index: EnvIndex
@@ -281,6 +285,17 @@ def _hidden_scale(settings: Settings | SpatialSettings) -> tuple[float, float]:
     low, high = np.log(robots.offset)
     ratios = np.exp(-np.linspace(low, high, 33))
     return float(ratios.mean()), float(ratios.std())
+
+
+def _stall_forces(settings: Settings | SpatialSettings) -> np.ndarray:
+    """Return the forces on the commands at which the nominal robot stalls, out and in, ``(2, c)`` [EI/(aL)].
+
+    Cables nearer to the backbone than the offset of the robot bend it by less. Where several share a command, a single
+    one may carry all of it.
+    """
+    matrix, limit = settings.actuation.matrix, settings.robot.max_tension / settings.scales.tension_n
+    shares = np.array([np.maximum(side * matrix, 0.0).sum(axis=0) for side in (-1, 1)])
+    return limit * np.where(shares > 0, np.minimum(shares, 1.0), 1.0)
 
 
 def _posteriors(shape: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -45,7 +45,7 @@ class TensionFilter:
         commands: Number c of commands of a robot.
         candidates: The candidates.
         sensing: Ranges of the imperfections.
-        limit: Tension at which the nominal robot stalls [EI/(aL)].
+        limits: Forces on the commands at which the nominal robot stalls, out and in, ``(2, c)`` [EI/(aL)].
         gain: Largest root of the sum of squares of the cables' shares in a command, by which their errors add up.
 
     Attributes:
@@ -58,9 +58,9 @@ class TensionFilter:
     """
 
     def __init__(
-        self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limit: float, gain: float
+        self, count: int, commands: int, candidates: Candidates, sensing: Sensing, limits: np.ndarray, gain: float
     ) -> None:
-        self._limit, self._kept = limit, 1 - candidates.losses
+        self._limits, self._kept = limits[..., None, None], 1 - candidates.losses
         self.noise = max(gain * sensing.tension_noise[1], LEAST)
         self._least, self._most = sensing.rigidity_ratio
         self._usual, spread = (self._least + self._most) / 2, max((self._most - self._least) / np.sqrt(12), LEAST)
@@ -156,8 +156,9 @@ class TensionFilter:
         return np.where(self._stalled(both[1], index), 0.5, inward)
 
     def _stalled(self, robot: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return whether robots with such tensions may have stalled, ``(k, c, B, E)``."""
-        return np.asarray(np.abs(robot) > STALLED * self._limit * self.rigidity[index][:, None])
+        """Return whether robots with such forces on their commands may have stalled, ``(k, c, B, E)``."""
+        limits = np.where(robot < 0, *self._limits)
+        return np.asarray(np.abs(robot) > STALLED * limits * self.rigidity[index][:, None])
 
     def _update_contact(
         self, pulls: Pulls, places: np.ndarray, loops: Loops, touching: np.ndarray, index: EnvIndex

@@ -119,3 +119,11 @@ def test_the_papers_robot_senses_and_estimates_alike_in_all_quadrants(estimator,
     for forces, rows in records[1:]:
         assert forces == pytest.approx(records[0][0], abs=1e-6)
         assert rows == pytest.approx(records[0][1], abs=1e-6)
+
+
+@pytest.mark.parametrize("weight", [(1e-12, 0.0, 0.0), (5e-5, 0.0, 0.0), (0.0, 5e-5, 0.0)])
+def test_a_robot_that_hangs_in_a_cable_finds_scenes(weight):
+    """A cable that holds the robot at rest is at its length to roundoff, of either sign."""
+    env = make(robot=replace(make().unwrapped.settings.robot, weight_per_length=weight))
+    for seed in range(3):
+        env.reset(seed=seed)

@@ -3,6 +3,7 @@
 
 #include "model/models.hpp"
 #include "solve/model_continuation.hpp"
+#include "tolerances.hpp"
 
 namespace ccr {
 
@@ -11,7 +12,8 @@ bool ModelContinuation<Model>::ramp_reaches_force(const Ramp& ramp, double* reac
   std::fill_n(reached, kSpace, 0.0);
   if (!(ramp.increment > 0)) return false;
   std::vector<double> start(layout_.size);
-  if (rest(ramp.length, start.data()).status != Status::kConverged || problem_.violation() > 0) return false;
+  if (rest(ramp.length, start.data()).status != Status::kConverged) return false;
+  if (problem_.violation() > tolerances::kFeasibility * problem_.robot().max_length) return false;
   read_block(start.data());
   Command command{{}, ramp.length};
   for (int i = 1; i * ramp.increment < ramp.limit; ++i) {

@@ -8,6 +8,7 @@ import pytest
 
 from agents import RobotEstimator, search
 from ccr_gym import ENV_IDS, Sensing
+from solver import Cable, Robot
 
 IDS = sorted(env_id for env_id in ENV_IDS if "-Paper-" not in env_id)
 NUMBERS = ("latency", "half_backlash", "loss", "rigidity")
@@ -222,3 +223,23 @@ def test_a_new_estimator_is_one_that_was_reset():
         for one, other in zip(new.update(observation), reset.update(observation), strict=True):
             assert np.array_equal(one, other)
         observation = envs.step(np.ones((3, 1), np.float32))[0]
+
+
+@pytest.mark.parametrize(
+    "bent", [{"precurvature": 0.005}, {"precurvature": -0.002}, {"weight_per_length": (2e-4, 0.0)}], ids=str
+)
+def test_a_robot_that_is_bent_at_rest_is_none_with_more_play(bent):
+    """Its shape shows a command before its motor moves, and its cable is slack up to there, or taut at once."""
+    robot = Robot.prototype(**bent)
+    rows, truth = followed("CCR/PushObstacle-v1", "sensorless", walking(), 60, robot=robot)
+    assert force_within(rows) >= 0.95
+    for name in NUMBERS:
+        assert within(rows, truth, name, 32) >= 0.93, name
+
+
+def test_a_cable_near_the_backbone_stalls_under_less_force():
+    """Its tension bends the robot by less, so that it is at its limit before the command of a usual cable is."""
+    robot = Robot.prototype(cables=(Cable(offset_mm=5.0),))
+    rows, truth = followed("CCR/PushObstacle-v1", "sensorless", walking(), 60, robot=robot)
+    assert force_within(rows) >= 0.95
+    assert within(rows, truth, "latency", 32) >= 0.98
