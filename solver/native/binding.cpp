@@ -1,6 +1,7 @@
 // The Python module solver._kernel.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -34,6 +35,11 @@ void bind_kernel(nb::module_& m, const char* name) {
            "displacements of the obstacles, and why the step was given up.")
       .def("optimality", &Kernel<D>::optimality, "block"_a,
            "Return stationarity, gap and complementarity, without units.")
+      .def_prop_ro("slopes_shape", &Kernel<D>::slopes_shape,
+                   "Numbers of parameters of an equilibrium and of their slopes.")
+      .def("slopes", &Kernel<D>::slopes, "block"_a, "held"_a.none(), "to"_a,
+           "Write the slopes of an equilibrium in each parameter, while contacts stay closed. Return whether they were "
+           "found, and how many closed gaps were left out that the others imply.")
       .def("move", &Kernel<D>::move, "from_"_a, "command"_a, "origins"_a, "towards"_a, "motions"_a, "to"_a,
            "Step while the obstacles move from some to others. Return also which part of their way they have gone.")
       .def("rest", &Kernel<D>::rest, "length"_a, "to"_a,

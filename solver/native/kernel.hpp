@@ -7,6 +7,7 @@
 #include <chrono>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -54,7 +55,12 @@ template <int D>
 class Kernel {
  public:
   Kernel(const Robot& robot, std::vector<Obstacle<D>> obstacles)
-      : robot_(robot), obstacles_(std::move(obstacles)), idle_(make()), layout_(idle_->layout()) {}
+      : robot_(robot),
+        obstacles_(std::move(obstacles)),
+        idle_(make()),
+        layout_(idle_->layout()),
+        parameters_(idle_->parameters()),
+        slope_row_(idle_->slope_row()) {}
 
   std::size_t block_size() const { return layout_.size; }
 
@@ -107,6 +113,17 @@ class Kernel {
     return {to_array(std::move(shapes)), result.reason};
   }
 
+  std::tuple<int, int> slopes_shape() const { return {parameters_, slope_row_}; }
+
+  std::tuple<bool, int> slopes(const Input& block, const std::optional<Mask>& held, const Output& to) {
+    require_block(block);
+    require(to.size() == static_cast<std::size_t>(parameters_) * slope_row_, "the slopes must have the slopes_shape");
+    require(!held || held->size() == layout_.multipliers.size, "held must have an entry for each contact");
+    const Lease continuation(*this);
+    const SlopeResult result = continuation->slopes(block.data(), held ? held->data() : nullptr, to.data());
+    return {result.found, result.left_out};
+  }
+
   Numbers<3> optimality(const Input& block) {
     require_block(block);
     const Lease continuation(*this);
@@ -157,6 +174,7 @@ class Kernel {
   std::vector<Obstacle<D>> obstacles_;
   std::unique_ptr<Continuation<D>> idle_;  // none during a call
   BlockLayout layout_;
+  int parameters_, slope_row_;
 };
 
 template <int D>
