@@ -76,7 +76,7 @@ def respond(
     Raises:
         ValueError: If ``active`` has the wrong shape, or contacts that cannot all be closed at once.
     """
-    active = _check_active(equilibrium, active)
+    active = check_active(equilibrium, active)
     touching = active[:, :, 1:].ravel()
     conditions, varied, loads, load_slopes = (value.full() for value in kkt(*equilibrium.node_solution()))
     unknowns = conditions.shape[1]
@@ -101,8 +101,12 @@ def respond(
     return Response(change[:unknowns].T.copy(), multipliers, (signed.T @ change + load_slopes).T, loads.ravel())
 
 
-def _check_active(equilibrium: BaseEquilibrium[AnyRobot], active: np.ndarray | None) -> np.ndarray:
-    """Return which contacts stay closed, by default those with a positive multiplier."""
+def check_active(equilibrium: BaseEquilibrium[AnyRobot], active: np.ndarray | None) -> np.ndarray:
+    """Return which contacts stay closed, by default those with a positive multiplier.
+
+    Raises:
+        ValueError: If ``active`` has the wrong shape, or contacts of points that cannot touch.
+    """
     active = equilibrium.contact if active is None else active
     if not (isinstance(active, np.ndarray) and active.dtype == bool and active.shape == equilibrium.contact.shape):
         has = f"has shape {active.shape} of {active.dtype}" if isinstance(active, np.ndarray) else f"is {shown(active)}"

@@ -2,12 +2,14 @@
 
 from collections import OrderedDict
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver import _kernel
 from solver.common.equilibrium import BaseEquilibrium
+from solver.common.implicit import check_active
+from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
 
@@ -15,57 +17,89 @@ MOST_KERNELS = 16
 Kernel = _kernel.Kernel | _kernel.SpatialKernel
 
 
+class _Part(NamedTuple):
+    """A part of every row of slopes, and the shape of all of them."""
+
+    columns: slice
+    shape: tuple[int, ...]
+
+
+class _Held(NamedTuple):
+    """A kernel, what it was made of, and the parts of its slopes."""
+
+    robot: object
+    scene: object
+    kernel: Kernel | None
+    shape: tuple[int, int]
+    parts: tuple[_Part, ...]
+
+
 class KernelSlopes:
     """Finds slopes by the kernel, of which it keeps those of the robots and scenes that it was asked for last.
 
     Args:
         make: Makes the kernel of a robot and a scene.
+        layout: Returns the memory layout of the blocks of a robot among a number of obstacles.
     """
 
-    def __init__(self, make: Callable[[Any, Scene], Kernel]) -> None:
-        self._make = make
-        # By identity: to compare robots would take longer than their slopes. The entries hold what has the identity.
-        self._kernels: OrderedDict[tuple[int, int], tuple[object, object, Kernel]] = OrderedDict()
+    def __init__(self, make: Callable[[Any, Scene], Kernel], layout: Callable[[Any, int], Layout]) -> None:
+        self._make, self._layout = make, layout
+        # By identity: to compare robots would take longer than to find their slopes.
+        self._held: OrderedDict[tuple[int, int], _Held] = OrderedDict()
 
-    def __call__(self, equilibrium: BaseEquilibrium[AnyRobot], active: np.ndarray | None) -> tuple[np.ndarray, ...] | None:
-        """Return the slopes of node poses, multipliers, tensions, forces and displacements, parameters first.
-
-        In space those of node poses are positions, then turns of the disks, ``(q, 2 (n+1), 3)``.
+    def __call__(
+        self, equilibrium: BaseEquilibrium[AnyRobot], active: np.ndarray | None = None
+    ) -> list[np.ndarray] | None:
+        """Return the slopes of nodes, in space of their turns, multipliers, tensions, forces and displacements.
 
         Args:
             equilibrium: The equilibrium.
-            active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier.
+            active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier, but
+                for those that others imply, such as the third of a link that lies flush on a side: their multipliers
+                keep still.
 
         Returns:
-            The slopes, or ``None`` where the kernel does not find them: its Hessian is singular, or contacts in
-            ``active`` depend on each other or are too many.
+            The slopes, with the parameters along their first axes; ``None`` where the kernel finds none: its Hessian is
+            singular, too many contacts are closed, or no compiler is there for a custom shape.
+
+        Raises:
+            ValueError: If ``active`` has the wrong shape, or contacts that cannot all be closed at once.
         """
-        kernel = self._kernel(equilibrium.robot, equilibrium.scene)
-        slopes = np.empty(kernel.slopes_shape)
-        found, left_out = kernel.slopes(equilibrium.block, active, slopes)
-        if not found or (active is not None and left_out):
+        robot, scene = equilibrium.robot, equilibrium.scene
+        _, _, kernel, shape, parts = self._held.get((id(robot), id(scene))) or self._hold(robot, scene)
+        if kernel is None:
             return None
-        return self._split(equilibrium, slopes)
+        if active is not None:
+            active = check_active(equilibrium, active).copy()
+            active[~np.array(scene.mounted, bool), :, 0] = False  # the base does not move
+        slopes = np.empty(shape)
+        found, left_out = kernel.slopes(equilibrium.block, active, slopes)
+        if active is not None and left_out:
+            raise ValueError(f"active has {active.sum()} contacts that depend on each other; close fewer")
+        return [slopes[:, columns].reshape(shape) for columns, shape in parts] if found else None
 
-    @staticmethod
-    def _split(equilibrium: BaseEquilibrium[AnyRobot], slopes: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the parts of the rows of slopes as views."""
-        parameters, width = slopes.shape
-        layout = equilibrium._layout
-        shapes = [layout.multipliers.shape, layout.cables.shape, layout.forces.shape, layout.displacements.shape]
-        ends = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
-        start = width - int(ends[-1])
-        parts = [slopes[:, :start].reshape(parameters, -1, 3)]
-        for shape, end in zip(shapes, ends.tolist(), strict=True):
-            parts.append(slopes[:, start : width - int(ends[-1]) + end].reshape(parameters, *shape))
-            start = width - int(ends[-1]) + end
+    def _hold(self, robot: Any, scene: Scene) -> _Held:
+        """Return the kernel of a robot and a scene, which takes the place of the oldest one."""
+        try:
+            kernel = self._make(robot, scene)
+        except RuntimeError:  # a custom shape cannot be compiled
+            held = _Held(robot, scene, None, (0, 0), ())
+        else:
+            shape = kernel.slopes_shape
+            held = _Held(robot, scene, kernel, shape, self._parts(robot, scene, shape[0]))
+        self._held[id(robot), id(scene)] = held
+        if len(self._held) > MOST_KERNELS:
+            self._held.popitem(last=False)
+        return held
+
+    def _parts(self, robot: Any, scene: Scene, parameters: int) -> tuple[_Part, ...]:
+        layout = self._layout(robot, len(scene))
+        nodes = (robot.segments + 1, 3)
+        fields = [layout.multipliers, layout.cables, layout.forces, layout.displacements]
+        shapes = [nodes] * (1 if layout.force.shape == (2,) else 2)
+        parts, start = [], 0
+        for shape in [*shapes, *(field.shape for field in fields)]:
+            stop = start + int(np.prod(shape))
+            parts.append(_Part(slice(start, stop), (parameters, *shape)))
+            start = stop
         return tuple(parts)
-
-    def _kernel(self, robot: Any, scene: Scene) -> Kernel:
-        key = id(robot), id(scene)
-        kept = self._kernels.get(key)
-        if kept is None:
-            kept = self._kernels[key] = robot, scene, self._make(robot, scene)
-            if len(self._kernels) > MOST_KERNELS:
-                self._kernels.popitem(last=False)
-        return kept[2]

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "batch_calls.hpp"
 #include "kernel.hpp"
 #include "kernel_input.hpp"
 
@@ -73,6 +74,12 @@ void bind_batch(nb::module_& m, const char* name) {
           "obstacles go to, and bounds on how far their surfaces go.")
       .def("step", &step<D>, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Move some robots to their commands, cables and length, in place.")
+      .def("slopes", &slopes<D>, "robots"_a, "blocks"_a, "slopes"_a, "found"_a,
+           "Write the slopes of the equilibria of some robots in their commands, cables and length, and whether they "
+           "were "
+           "found.")
+      .def(
+          "slope_row", [](const Batch<D>& batch) { return batch.slope_row(); }, "Numbers of the slopes in a parameter.")
       .def("optimality", &optimality<D>, "blocks"_a, "found"_a,
            "Write stationarity, gap and complementarity of all robots.")
       .def("ramps_reach_forces", &ramps_reach_forces<D>, "robots"_a, "forces"_a, "obstacle"_a, "directions"_a,

@@ -181,9 +181,9 @@ def hessian_contraction_function() -> ca.Function:
 def input_contraction_function() -> ca.Function:
     """Return ``(control, bending, pulls, l0, holes, force, moment) → slopes of the law in its inputs``, ``(21,)``.
 
-    The inputs are both pulls and l0. First the slopes in l0 of the chord and of the rotation of the upper disk, as those
-    of :func:`bend_function`; then the second derivatives of what :func:`hessian_contraction_function` contracts, of
-    control (rows) and inputs (columns), row by row, and the lower triangle of those in the inputs alone.
+    The inputs are both pulls and l0. First the slopes in l0 of the chord and of the rotation of the upper disk, as
+    those of :func:`bend_function`; then the second derivatives of what :func:`hessian_contraction_function` contracts,
+    of control (rows) and inputs (columns), row by row, and the lower triangle of those in the inputs alone.
     """
     segment, force, moment = _Segment(), ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
     control, bending, inputs = segment.control, segment.bending, ca.vertcat(segment.pulls, segment.length)

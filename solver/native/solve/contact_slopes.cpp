@@ -69,16 +69,16 @@ GapRate<ContactProblem<Model>::kSpace> ContactProblem<Model>::gap_rate(int conta
 
 // Over the energy scale, which falls with the length, a load grows with it, and the weight of a segment once more.
 template <class Model>
-void ContactProblem<Model>::add_load_growth(std::vector<State>& node_forces) const {
+void ContactProblem<Model>::add_load_growth(std::vector<State>& node_slopes) const {
   if constexpr (Model::kRod) {
-    std::vector<State> growth(node_forces.size());
-    add_loads(growth);
     const int n = robot_.segments;
-    const double segment = loaded_ / energy_scale() * model_.segment_length();
-    for (int i = 1; i <= n; ++i)
-      for (int k = 0; k < kSpace; ++k) growth[i][k] += segment * (i < n ? 1 : 0.5) * robot_.rod.weight[k];
-    for (int i = 1; i <= n; ++i)
-      for (int k = 0; k < kState; ++k) node_forces[i][k] += growth[i][k] / (n * model_.segment_length());
+    const double length = n * model_.segment_length(), scale = loaded_ / energy_scale();
+    std::vector<State> forces(node_slopes.size());
+    add_loads(forces);
+    for (int i = 1; i <= n; ++i) {
+      for (int k = 0; k < kState; ++k) node_slopes[i][k] -= forces[i][k] / length;
+      for (int k = 0; k < kSpace; ++k) node_slopes[i][k] -= scale * (i < n ? 1 : 0.5) * robot_.rod.weight[k] / n;
+    }
   }
 }
 

@@ -79,9 +79,10 @@ class Continuation {
   virtual int slope_row() const = 0;
   virtual int parameters() const = 0;
 
-  // Writes the slopes of the equilibrium in a block in each parameter; see solve/slopes.hpp. The contacts stay closed
-  // that `held` names with an entry for each, or where it is null those that press.
-  virtual SlopeResult slopes(const double* block, const bool* held, double* to) = 0;
+  // Writes the slopes of the equilibrium in a block in its command, and also in its obstacles or not; see
+  // solve/slopes.hpp. The contacts stay closed that `held` names with an entry for each, or where it is null those that
+  // press.
+  virtual SlopeResult slopes(const double* block, const bool* held, bool in_obstacles, double* to) = 0;
 };
 
 // Makes the continuation of a robot's model. The number of obstacles is that of every scene.

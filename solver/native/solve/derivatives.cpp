@@ -9,15 +9,14 @@ namespace ccr {
 template <class Model>
 int ModelContinuation<Model>::slope_row() const {
   const auto count = [](const BlockField& field) { return static_cast<int>(field.size); };
-  const int obstacles = static_cast<int>(problem_.obstacles().size());
+  const int obstacles = layout_.displacements.shape[0];
   return SlopeRow<Model>(problem_.robot().segments, count(layout_.multipliers), count(layout_.cables), obstacles)
       .size();
 }
 
 template <class Model>
 int ModelContinuation<Model>::parameters() const {
-  const int obstacles = static_cast<int>(problem_.obstacles().size());
-  return static_cast<int>(layout_.cables.size) + 1 + ContactProblem::kMotions * obstacles;
+  return static_cast<int>(layout_.cables.size) + 1 + ContactProblem::kMotions * layout_.displacements.shape[0];
 }
 
 // Lists the gaps that stay closed: of taut cables, of disks that meet, and of contacts. False where they are too many.
@@ -40,21 +39,21 @@ bool ModelContinuation<Model>::find_held(const bool* held, ActiveSet& gaps) cons
 }
 
 template <class Model>
-SlopeResult ModelContinuation<Model>::slopes(const double* block, const bool* held, double* to) {
+SlopeResult ModelContinuation<Model>::slopes(const double* block, const bool* held, bool in_obstacles, double* to) {
   read_block(block);
   evaluate_present();
   ActiveSet gaps;
   if (!find_held(held, gaps)) return {};
   if (!slopes_ || slopes_->mounts() != problem_.mounts())
     slopes_ = std::make_unique<Slopes<Model>>(problem_.robot().segments, problem_.mounts());
-  const int left_out = slopes_->differentiate(problem_, present_, gaps, to);
+  const int left_out = slopes_->differentiate(problem_, present_, gaps, in_obstacles, to);
   return {left_out >= 0, std::max(left_out, 0)};
 }
 
 #define CCR_INSTANTIATE(Model)                               \
   template int ModelContinuation<Model>::slope_row() const;  \
   template int ModelContinuation<Model>::parameters() const; \
-  template SlopeResult ModelContinuation<Model>::slopes(const double*, const bool*, double*);
+  template SlopeResult ModelContinuation<Model>::slopes(const double*, const bool*, bool, double*);
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

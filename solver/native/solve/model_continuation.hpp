@@ -57,7 +57,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   Optimality optimality(const double* block) override;
   int slope_row() const override;
   int parameters() const override;
-  SlopeResult slopes(const double* block, const bool* held, double* to) override;
+  SlopeResult slopes(const double* block, const bool* held, bool in_obstacles, double* to) override;
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension, kPushing };

@@ -20,7 +20,7 @@ Slopes<Model>::Slopes(int segments, int mounts)
 
 template <class Model>
 int Slopes<Model>::differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held,
-                                 double* rows) {
+                                 bool in_obstacles, double* rows) {
   kkt_.assemble(problem, at.active, 0);
   if (!kkt_.factor(0)) return -1;
   const int cables = Model::kRod ? static_cast<int>(problem.robot().rod.cables.size()) : kCables;
@@ -32,13 +32,12 @@ int Slopes<Model>::differentiate(const ContactProblem& problem, const Iterate& a
   if constexpr (!Model::kRod) find_within();
   used_ = 0;
   add_cable_rows(problem.contacts(), cables);
-  for (std::size_t j = 0; j < problem.obstacles().size(); ++j)
-    for (int motion = 0; motion < kMotions; ++motion)
-      add_obstacle_row(problem, static_cast<int>(j), motion, cables + 1);
+  const int obstacles = static_cast<int>(problem.obstacles().size()), moving = in_obstacles ? obstacles : 0;
+  for (int j = 0; j < moving; ++j)
+    for (int motion = 0; motion < kMotions; ++motion) add_obstacle_row(problem, j, motion, cables + 1);
   respond();
-  const int obstacles = static_cast<int>(problem.obstacles().size());
   const SlopeRow<Model> fields(segments_, problem.contacts(), cables, obstacles);
-  std::fill_n(rows, (cables + 1 + kMotions * obstacles) * fields.size(), 0.0);
+  std::fill_n(rows, (cables + 1 + kMotions * moving) * fields.size(), 0.0);
   for (int k = 0; k < used_; ++k) finish(problem, at, rows_[k], rows + rows_[k].parameter * fields.size());
   return held.count - held_.count;
 }
@@ -63,32 +62,12 @@ void Slopes<Model>::find_touches(const ContactProblem& problem, const Iterate& a
 template <class Model>
 void Slopes<Model>::find_input(const ContactProblem& problem, const Iterate& at, int number) {
   Input& input = inputs_[number];
-  auto& laws = laws_.segment[number];
-  const auto& system = kkt_.system();
-  for (const Touch& touch : touches_)
-    if (touch.multiplier != 0) problem.add_coupling(touch.contact, touch.multiplier, laws);
-  input.node_slopes[0] = {};
-  for (int i = 0; i < segments_; ++i) {
-    input.moved[i + 1] = times(system.stages[i].a, input.moved[i]);
-    input.moved[i + 1] += laws[i].upper;
-    State& slope = input.node_slopes[i + 1] = times(system.node_hessian[i + 1], input.moved[i + 1]);
-    if (i + 1 < segments_) slope += laws[i + 1].lower;
-  }
   const bool is_length = number == kInputs - 1;
-  if (Model::kRod && problem.has_loads()) {
-    std::vector<State> growth(segments_ + 1);
-    problem.add_load_growth(growth);
-    for (int i = 0; i <= segments_; ++i) input.node_slopes[i] -= growth[i];
-  }
-  State force;
-  for (int i = segments_ - 1; i >= 0; --i) {
-    const auto& stage = system.stages[i];
-    force += input.node_slopes[i + 1];
-    input.gradient[i] = laws[i].own;
-    input.gradient[i] += times(stage.hux, input.moved[i]);
-    input.gradient[i] += transpose_times(stage.b, force);
-    force = transpose_times(stage.a, force);
-  }
+  for (const Touch& touch : touches_)
+    if (touch.multiplier != 0) problem.add_coupling(touch.contact, touch.multiplier, laws_.segment[number]);
+  move_nodes(laws_.segment[number], input);
+  if (Model::kRod && problem.has_loads()) problem.add_load_growth(input.node_slopes);
+  pull_back(laws_.segment[number], input);
   for (int m = 0; m < mounts_; ++m) {
     input.mounts[m] = is_length ? times(problem.spring(m), at.mounts[m]) : Position{};
     for (double& slope : input.mounts[m].v) slope /= at.command.length;
@@ -99,26 +78,52 @@ void Slopes<Model>::find_input(const ContactProblem& problem, const Iterate& at,
     if (touch.mount >= 0) input.mounts[touch.mount] += times(touch.gap.curvature(touch.multiplier), velocity);
     if (touch.held >= 0) input.gaps[touch.held] = dot(touch.gap.slope, velocity);
   }
-  if constexpr (Model::kRod) {
-    add_own_gaps(problem, input);
-    for (int j = 0; j < at.active.count; ++j)
-      if (const int contact = at.active.contact[j]; contact >= problem.first_disk_contact()) {
-        const auto slope = problem.disk_length_slope(contact).slope;
-        Control& gradient = input.gradient[problem.disk_segment(contact)];
-        for (int k = 0; k < Model::kControl; ++k) gradient[k] -= at.active.multiplier[j] * slope[k];
-      }
+  if constexpr (Model::kRod) add_own_gaps(problem, at.active, input);
+}
+
+// Moves the nodes at fixed controls, and finds the slope of the Lagrangian in their states.
+template <class Model>
+void Slopes<Model>::move_nodes(const std::vector<InputSlope<Model>>& laws, Input& input) const {
+  const auto& system = kkt_.system();
+  for (int i = 0; i < segments_; ++i) {
+    input.moved[i + 1] = times(system.stages[i].a, input.moved[i]);
+    input.moved[i + 1] += laws[i].upper;
+    input.node_slopes[i + 1] = times(system.node_hessian[i + 1], input.moved[i + 1]);
+    if (i + 1 < segments_) input.node_slopes[i + 1] += laws[i + 1].lower;
   }
 }
 
-// Slopes in the length of a rod's slacks and of the gaps between its disks.
+// Carries these slopes back to the controls.
 template <class Model>
-void Slopes<Model>::add_own_gaps(const ContactProblem& problem, Input& input) {
-  if constexpr (Model::kRod)
+void Slopes<Model>::pull_back(const std::vector<InputSlope<Model>>& laws, Input& input) const {
+  State force;
+  for (int i = segments_ - 1; i >= 0; --i) {
+    const auto& stage = kkt_.system().stages[i];
+    force += input.node_slopes[i + 1];
+    input.gradient[i] = laws[i].own;
+    input.gradient[i] += times(stage.hux, input.moved[i]);
+    input.gradient[i] += transpose_times(stage.b, force);
+    force = transpose_times(stage.a, force);
+  }
+}
+
+// Adds what a rod's slacks and the gaps between its disks change with the length.
+template <class Model>
+void Slopes<Model>::add_own_gaps(const ContactProblem& problem, const ActiveSet& active, Input& input) const {
+  if constexpr (Model::kRod) {
     for (int j = 0; j < held_.count; ++j) {
       const int contact = held_.contact[j];
       if (problem.is_slack(contact)) input.gaps[j] = laws_.slack[contact - problem.contacts()];
       if (contact >= problem.first_disk_contact()) input.gaps[j] = problem.disk_length_slope(contact).value;
     }
+    for (int j = 0; j < active.count; ++j) {
+      const int contact = active.contact[j];
+      if (contact < problem.first_disk_contact()) continue;
+      const Control slope = problem.disk_length_slope(contact).slope;
+      Control& gradient = input.gradient[problem.disk_segment(contact)];
+      for (int k = 0; k < Model::kControl; ++k) gradient[k] -= active.multiplier[j] * slope[k];
+    }
+  }
 }
 
 template <class Model>

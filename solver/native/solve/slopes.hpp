@@ -38,10 +38,11 @@ class Slopes {
   Slopes(int segments, int mounts);
   int mounts() const { return mounts_; }
 
-  // Writes a row for each parameter at an equilibrium, at which the problem has its gradient, while the gaps in `held`
-  // stay closed. Leaves out those that the others imply, whose multipliers keep still, and returns their number; -1
-  // where the Hessian is singular.
-  int differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held, double* rows);
+  // Writes a row for each parameter, with those of the obstacles or not, at an equilibrium at which the problem has its
+  // gradient, while the gaps in `held` stay closed. Leaves out those that the others imply, whose multipliers keep
+  // still, and returns their number; -1 where the Hessian is singular.
+  int differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held, bool in_obstacles,
+                    double* rows);
 
  private:
   static constexpr int kSpace = Model::kSpace, kInputs = Model::kInputs, kCables = Model::kCables;
@@ -83,7 +84,9 @@ class Slopes {
 
   void find_touches(const ContactProblem& problem, const Iterate& at);
   void find_input(const ContactProblem& problem, const Iterate& at, int number);
-  void add_own_gaps(const ContactProblem& problem, Input& input);
+  void move_nodes(const std::vector<InputSlope<Model>>& laws, Input& input) const;
+  void pull_back(const std::vector<InputSlope<Model>>& laws, Input& input) const;
+  void add_own_gaps(const ContactProblem& problem, const ActiveSet& active, Input& input) const;
   void find_within();
   void add_cable_rows(int contacts, int cables);
   void add_obstacle_row(const ContactProblem& problem, int obstacle, int motion, int first);
