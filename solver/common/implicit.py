@@ -88,7 +88,7 @@ def respond(
     matrix[:, :unknowns] = slopes
     matrix[:unknowns, unknowns:] = -slopes[unknowns:].T
     try:
-        change = np.linalg.solve(matrix, -varied)
+        change = _solve(matrix, -varied)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"active has {touching.sum()} contacts that depend on each other; close fewer") from error
     # The loads are L_v, so their slopes in (z, ν, λ) are those of (L_z, −equalities, −gaps) in v.
@@ -99,6 +99,15 @@ def respond(
     inner[:, touching] = change[equations + sum(closed) :].T
     multipliers[:, :, :, 1:] = inner.reshape(multipliers[:, :, :, 1:].shape)
     return Response(change[:unknowns].T.copy(), multipliers, (signed.T @ change + load_slopes).T, loads.ravel())
+
+
+def _solve(matrix: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Solve linear equations whose coefficients differ by many orders of magnitude, with two rounds of refinement."""
+    solution = np.linalg.solve(matrix, sides).astype(np.longdouble)
+    for _ in range(2):
+        residual = sides - matrix.astype(np.longdouble) @ solution
+        solution += np.linalg.solve(matrix, residual.astype(float))
+    return np.asarray(solution, float)
 
 
 def check_active(equilibrium: BaseEquilibrium[AnyRobot], active: np.ndarray | None) -> np.ndarray:

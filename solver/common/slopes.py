@@ -1,5 +1,6 @@
 """Slopes of an equilibrium in its parameters, found by the kernel."""
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -17,21 +18,14 @@ MOST_KERNELS = 16
 Kernel = _kernel.Kernel | _kernel.SpatialKernel
 
 
-class _Part(NamedTuple):
-    """A part of every row of slopes, and the shape of all of them."""
-
-    columns: slice
-    shape: tuple[int, ...]
-
-
 class _Held(NamedTuple):
-    """A kernel, what it was made of, and the parts of its slopes."""
+    """A kernel, what it was made of, and columns and shapes of the parts of its slopes."""
 
     robot: object
     scene: object
     kernel: Kernel | None
     shape: tuple[int, int]
-    parts: tuple[_Part, ...]
+    parts: list[tuple[slice, tuple[int, ...]]]
 
 
 class KernelSlopes:
@@ -60,7 +54,8 @@ class KernelSlopes:
 
         Returns:
             The slopes, with the parameters along their first axes; ``None`` where the kernel finds none: its Hessian is
-            singular, too many contacts are closed, or no compiler is there for a custom shape.
+            singular, contacts or taut cables all but depend on each other, too many contacts are closed, or no compiler
+            is there for a custom shape.
 
         Raises:
             ValueError: If ``active`` has the wrong shape, or contacts that cannot all be closed at once.
@@ -83,23 +78,24 @@ class KernelSlopes:
         try:
             kernel = self._make(robot, scene)
         except RuntimeError:  # a custom shape cannot be compiled
-            held = _Held(robot, scene, None, (0, 0), ())
+            held = _Held(robot, scene, None, (0, 0), [])
         else:
             shape = kernel.slopes_shape
-            held = _Held(robot, scene, kernel, shape, self._parts(robot, scene, shape[0]))
+            parts = row_parts(self._layout(robot, len(scene)), robot.segments)
+            held = _Held(robot, scene, kernel, shape, [(columns, (shape[0], *part)) for columns, part in parts])
         self._held[id(robot), id(scene)] = held
         if len(self._held) > MOST_KERNELS:
             self._held.popitem(last=False)
         return held
 
-    def _parts(self, robot: Any, scene: Scene, parameters: int) -> tuple[_Part, ...]:
-        layout = self._layout(robot, len(scene))
-        nodes = (robot.segments + 1, 3)
-        fields = [layout.multipliers, layout.cables, layout.forces, layout.displacements]
-        shapes = [nodes] * (1 if layout.force.shape == (2,) else 2)
-        parts, start = [], 0
-        for shape in [*shapes, *(field.shape for field in fields)]:
-            stop = start + int(np.prod(shape))
-            parts.append(_Part(slice(start, stop), (parameters, *shape)))
-            start = stop
-        return tuple(parts)
+
+def row_parts(layout: Layout, segments: int) -> list[tuple[slice, tuple[int, ...]]]:
+    """Return columns and shape of each part of a row of slopes, in the order of :class:`KernelSlopes`."""
+    nodes = (segments + 1, 3)
+    fields = [layout.multipliers, layout.cables, layout.forces, layout.displacements]
+    parts, start = [], 0
+    for shape in [nodes] * (layout.force.shape[0] - 1) + [field.shape for field in fields]:
+        stop = start + math.prod(shape)
+        parts.append((slice(start, stop), shape))
+        start = stop
+    return parts

@@ -78,7 +78,7 @@ void bind_batch(nb::module_& m, const char* name) {
            "Write the slopes of the equilibria of some robots in their commands, cables and length, and whether they "
            "were "
            "found.")
-      .def(
+      .def_prop_ro(
           "slope_row", [](const Batch<D>& batch) { return batch.slope_row(); }, "Numbers of the slopes in a parameter.")
       .def("optimality", &optimality<D>, "blocks"_a, "found"_a,
            "Write stationarity, gap and complementarity of all robots.")

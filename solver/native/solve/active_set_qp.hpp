@@ -55,8 +55,9 @@ class ActiveSetQp {
   using Multipliers = std::array<double, tolerances::kMaxActive>;
 
   // Factors the system of gaps that stay closed; leaves out those whose slopes depend on those before. Curvature of any
-  // sign is accepted.
-  void hold(const ContactProblem& problem, KktSystem& kkt, ActiveSet& held);
+  // sign is accepted. Returns the least curvature that one adds, over that of the gap alone: how far they are from
+  // depending on each other.
+  double hold(const ContactProblem& problem, KktSystem& kkt, ActiveSet& held);
   // Completes a response at fixed multipliers to one that keeps the gaps of the last `hold` closed, in whose order
   // `changes` holds how each changes at a fixed shape. Leaves the changes of their multipliers there.
   void close(int count, Multipliers& changes, Direction& response) const;

@@ -24,7 +24,7 @@ struct Ramp {
 
 // How slopes were found. Left out are gaps that the others imply.
 struct SlopeResult {
-  bool found = false;  // not where the Hessian is singular, or more gaps are closed than the kernel holds
+  bool found = false;  // not where H is singular, closed gaps all but depend on each other, or there are too many
   int left_out = 0;
 };
 

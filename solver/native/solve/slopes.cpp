@@ -25,7 +25,12 @@ int Slopes<Model>::differentiate(const ContactProblem& problem, const Iterate& a
   if (!kkt_.factor(0)) return -1;
   const int cables = Model::kRod ? static_cast<int>(problem.robot().rod.cables.size()) : kCables;
   held_ = held;
-  qp_.hold(problem, kkt_, held_);
+  const auto cables_held = [&](const ActiveSet& gaps) {
+    const auto begin = gaps.contact.begin();
+    return std::count_if(begin, begin + gaps.count, [&](int contact) { return problem.is_slack(contact); });
+  };
+  if (qp_.hold(problem, kkt_, held_) < tolerances::kToDifferentiate) return -1;
+  if (cables_held(held_) < cables_held(held)) return -1;  // taut cables that lock the robot cannot be moved alone
   find_touches(problem, at);
   problem.input_slopes(at, laws_);
   for (int k = 0; k < kInputs; ++k) find_input(problem, at, k);

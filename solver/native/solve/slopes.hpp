@@ -40,7 +40,8 @@ class Slopes {
 
   // Writes a row for each parameter, with those of the obstacles or not, at an equilibrium at which the problem has its
   // gradient, while the gaps in `held` stay closed. Leaves out those that the others imply, whose multipliers keep
-  // still, and returns their number; -1 where the Hessian is singular.
+  // still, and returns their number; -1 where the Hessian is singular, or gaps all but
+  // depend on each other, as those of cables that lock a robot.
   int differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held, bool in_obstacles,
                     double* rows);
 
