@@ -84,7 +84,7 @@ def test_disks_that_meet(radius, thickness, cable, sign):
 
 def test_disks_that_meet_in_space():
     robot = replace(SPACE, model="rod", segments=12, max_tension=1000, disk_radius_mm=90.0, cables=TRIPLE)
-    solver = SpatialSolver(robot, Scene([Sphere(center=(55, 12, 130), radius=28)]))
+    solver = SpatialSolver(robot, Scene([Sphere(center=(62, 16, 110), radius=28)]))
     equilibrium = solver.rest()
     for part in np.linspace(0, 20, 41)[1:]:
         equilibrium = solver.step(equilibrium, (part, -part, -part))
