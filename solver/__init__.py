@@ -2,6 +2,7 @@
 
 from solver.cache.memo import TransitionMemo
 from solver.common.actuation import Actuation
+from solver.common.batch_slopes import CommandSlopes
 from solver.common.equilibrium import Optimality, Residuals
 from solver.common.obstacle import Extent, Obstacle
 from solver.common.presets import PRESETS, Preset
@@ -34,6 +35,7 @@ __all__ = [
     "Cable",
     "Capsule",
     "Circle",
+    "CommandSlopes",
     "Custom",
     "Ellipse",
     "Equilibrium",

@@ -10,8 +10,8 @@ for name in ("solver", "solver.spatial"):  # whose __init__ needs the kernel, wh
     sys.modules[name] = package = ModuleType(name)
     package.__path__ = [str(Path(__file__).parent.joinpath(*name.split(".")[1:]))]
 
-from solver.common.gap_laws import clearance_function, gap_function  # noqa: E402
-from solver.planar.formulation import GAP_LAWS, arc_function, disk_gap_function, segment_function  # noqa: E402
+from solver.common.gap_laws import clearance_function, gap_function, growth_function  # noqa: E402
+from solver.planar import formulation as planar  # noqa: E402
 from solver.spatial import arc  # noqa: E402
 from solver.spatial import formulation as spatial  # noqa: E402
 
@@ -28,8 +28,16 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1])
     in_space = [spatial.closure_function(), spatial.bend_function(), spatial.hessian_contraction_function()]
     of_arcs = [arc.arc_function(), arc.arc_hessian_function(), arc.cable_function(), arc.cable_hessian_function()]
-    generate("segment_laws", [segment_function(), arc_function(), *in_space], folder)
+    generate("segment_laws", [planar.segment_function(), planar.arc_function(), *in_space], folder)
     generate("arc_laws", of_arcs, folder)
-    generate("disk_laws", [disk_gap_function()], folder)
-    kinds = (*GAP_LAWS, *spatial.GAP_LAWS)
+    generate("disk_laws", [planar.disk_gap_function()], folder)
+    kinds = (*planar.GAP_LAWS, *spatial.GAP_LAWS)
     generate("gap_laws", [function(law) for law in kinds for function in (gap_function, clearance_function)], folder)
+    in_inputs = [
+        planar.segment_inputs_function(),
+        planar.disk_gap_length_function(),
+        spatial.input_contraction_function(),
+        arc.cable_length_function(),
+    ]
+    round_kinds = planar.CIRCLE, planar.ELLIPSE, planar.CAPSULE, spatial.SPHERE, spatial.CAPSULE
+    generate("slope_laws", [*in_inputs, *map(growth_function, round_kinds)], folder)

@@ -109,6 +109,15 @@ def clearance_function(law: GapLaw) -> ca.Function:
     return ca.Function(f"ccr_{law.kind}_clearance", [point, shape], [ca.cse(law.gap(point, shape))])
 
 
+def growth_function(law: GapLaw) -> ca.Function:
+    """Return ``(p, shape) → c_g, c_xg, c_yg`` of one kind of obstacle that grows by g, and likewise in space."""
+    point, shape = ca.SX.sym("point", law.space), ca.SX.sym("shape", law.size)
+    gap = law.gap(point, shape)
+    grown = ca.sum1(ca.vertcat(*(ca.gradient(gap, shape)[k] for k in law.growth)))
+    outputs = ca.vertcat(grown, ca.gradient(grown, point))
+    return ca.Function(f"ccr_{law.kind}_growth", [point, shape], [ca.cse(ca.densify(outputs))])
+
+
 @lru_cache(maxsize=64)
 @held_signals()
 def slope_function(law: GapLaw) -> ca.Function:

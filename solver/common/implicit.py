@@ -76,7 +76,7 @@ def respond(
     Raises:
         ValueError: If ``active`` has the wrong shape, or contacts that cannot all be closed at once.
     """
-    active = _check_active(equilibrium, active)
+    active = check_active(equilibrium, active)
     touching = active[:, :, 1:].ravel()
     conditions, varied, loads, load_slopes = (value.full() for value in kkt(*equilibrium.node_solution()))
     unknowns = conditions.shape[1]
@@ -88,7 +88,7 @@ def respond(
     matrix[:, :unknowns] = slopes
     matrix[:unknowns, unknowns:] = -slopes[unknowns:].T
     try:
-        change = np.linalg.solve(matrix, -varied)
+        change = _solve(matrix, -varied)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"active has {touching.sum()} contacts that depend on each other; close fewer") from error
     # The loads are L_v, so their slopes in (z, ν, λ) are those of (L_z, −equalities, −gaps) in v.
@@ -101,8 +101,21 @@ def respond(
     return Response(change[:unknowns].T.copy(), multipliers, (signed.T @ change + load_slopes).T, loads.ravel())
 
 
-def _check_active(equilibrium: BaseEquilibrium[AnyRobot], active: np.ndarray | None) -> np.ndarray:
-    """Return which contacts stay closed, by default those with a positive multiplier."""
+def _solve(matrix: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Solve linear equations whose coefficients differ by many orders of magnitude, with two rounds of refinement."""
+    solution = np.linalg.solve(matrix, sides).astype(np.longdouble)
+    for _ in range(2):
+        residual = sides - matrix.astype(np.longdouble) @ solution
+        solution += np.linalg.solve(matrix, residual.astype(float))
+    return np.asarray(solution, float)
+
+
+def check_active(equilibrium: BaseEquilibrium[AnyRobot], active: np.ndarray | None) -> np.ndarray:
+    """Return which contacts stay closed, by default those with a positive multiplier.
+
+    Raises:
+        ValueError: If ``active`` has the wrong shape, or contacts of points that cannot touch.
+    """
     active = equilibrium.contact if active is None else active
     if not (isinstance(active, np.ndarray) and active.dtype == bool and active.shape == equilibrium.contact.shape):
         has = f"has shape {active.shape} of {active.dtype}" if isinstance(active, np.ndarray) else f"is {shown(active)}"

@@ -48,6 +48,7 @@ class Batch {
   const BlockLayout& layout() const { return workers_[0]->layout(); }
   int count() const { return static_cast<int>(scenes_.size()); }
   int obstacles() const { return obstacles_; }  // of each scene
+  int slope_row() const { return workers_[0]->slope_row(); }
 
   // Puts a robot, by its index, among other obstacles.
   void set_obstacles(int robot, std::vector<Obstacle<D>> obstacles) { scenes_[robot] = std::move(obstacles); }

@@ -1,6 +1,7 @@
 // The Python module solver._kernel.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -9,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "batch_calls.hpp"
 #include "kernel.hpp"
 #include "kernel_input.hpp"
 
@@ -34,6 +36,11 @@ void bind_kernel(nb::module_& m, const char* name) {
            "displacements of the obstacles, and why the step was given up.")
       .def("optimality", &Kernel<D>::optimality, "block"_a,
            "Return stationarity, gap and complementarity, without units.")
+      .def_prop_ro("slopes_shape", &Kernel<D>::slopes_shape,
+                   "Numbers of parameters of an equilibrium and of their slopes.")
+      .def("slopes", &Kernel<D>::slopes, "block"_a, "held"_a.none(), "to"_a,
+           "Write the slopes of an equilibrium in each parameter, while contacts stay closed. Return whether they were "
+           "found, and how many closed gaps were left out that the others imply.")
       .def("move", &Kernel<D>::move, "from_"_a, "command"_a, "origins"_a, "towards"_a, "motions"_a, "to"_a,
            "Step while the obstacles move from some to others. Return also which part of their way they have gone.")
       .def("rest", &Kernel<D>::rest, "length"_a, "to"_a,
@@ -67,6 +74,12 @@ void bind_batch(nb::module_& m, const char* name) {
           "obstacles go to, and bounds on how far their surfaces go.")
       .def("step", &step<D>, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Move some robots to their commands, cables and length, in place.")
+      .def("slopes", &slopes<D>, "robots"_a, "blocks"_a, "slopes"_a, "found"_a,
+           "Write the slopes of the equilibria of some robots in their commands, cables and length, and whether they "
+           "were "
+           "found.")
+      .def_prop_ro(
+          "slope_row", [](const Batch<D>& batch) { return batch.slope_row(); }, "Numbers of the slopes in a parameter.")
       .def("optimality", &optimality<D>, "blocks"_a, "found"_a,
            "Write stationarity, gap and complementarity of all robots.")
       .def("ramps_reach_forces", &ramps_reach_forces<D>, "robots"_a, "forces"_a, "obstacle"_a, "directions"_a,

@@ -43,6 +43,7 @@ inline constexpr int kActiveSetChanges = 96;
 inline constexpr double kDependent =
     1e-12;  // relative curvature below which a gap is linearly dependent on the active ones
 inline constexpr double kNearlyDependent = 1e-6;  // the same of one that may take the place of another
+inline constexpr double kToDifferentiate = 1e-8;  // the same below which rounding would spoil derivatives
 inline constexpr double kNoPart = 1e-18;          // share of a gap in a combination that is roundoff
 
 // Convexification: a penalty on active gaps first, then damping of the unknowns, both relative to the largest

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver import _kernel
-from solver.common.batch import RobotBatch
+from solver.common.batch_slopes import SlopeBatch
 from solver.common.layout import Layout
 from solver.common.rows import Motion
 from solver.common.scene import Scene
@@ -17,10 +17,10 @@ from solver.planar.robot import Robot
 from solver.planar.solve import kernel_robot, kernel_scene
 
 
-class BatchSolver(RobotBatch[Robot, Equilibrium]):
+class BatchSolver(SlopeBatch[Robot, Equilibrium]):
     """Moves many robots in the plane by one call, with the results of :class:`solver.Solver`.
 
-    See :class:`~solver.common.batch.RobotBatch`.
+    See :class:`~solver.common.batch.RobotBatch` and :meth:`~solver.common.batch_slopes.SlopeBatch.slopes`.
     """
 
     space = 2

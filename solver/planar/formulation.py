@@ -132,6 +132,18 @@ def segment_function() -> ca.Function:
     return ca.Function("ccr_segment", [sine, pull, length, offset], [law])
 
 
+def segment_inputs_function() -> ca.Function:
+    """Return the slopes of the segment law of the paper's model in its inputs.
+
+    ``(σ, pull, l0, a) → θ_pull, θ_l0, θ_σpull, θ_σl0, θ_pullpull, θ_pulll0, θ_l0l0``.
+    """
+    sine, pull, length, offset = symbols = [ca.SX.sym(name) for name in ("sine", "pull", "length", "offset")]
+    inputs, angle = ca.vertcat(pull, length), 2 * ca.asin(segment_half_sine(sine, pull, length, offset))
+    hessian, slopes = ca.hessian(angle, inputs)
+    law = ca.vertcat(slopes, ca.gradient(ca.gradient(angle, sine), inputs), hessian[0, 0], hessian[1, 0], hessian[1, 1])
+    return ca.Function("ccr_segment_inputs", symbols, [ca.cse(ca.densify(law))])
+
+
 def arc_function() -> ca.Function:
     """Return the segment law of the rod, whose segments are arcs, with its derivatives in the angle.
 
@@ -178,6 +190,13 @@ def disk_gap_function() -> ca.Function:
     gap = disk_gap(angle, *sizes)
     slope = ca.gradient(gap, angle)
     return ca.Function("ccr_disk_gap", [angle, *sizes], [ca.cse(ca.vertcat(gap, slope, ca.gradient(slope, angle)))])
+
+
+def disk_gap_length_function() -> ca.Function:
+    """Return ``θ → c_l0, c'_l0``: the slope of :func:`disk_gap` in the length, and that one's in the angle."""
+    angle, length = ca.SX.sym("angle"), ca.SX.sym("length")
+    slope = ca.gradient(disk_gap(angle, length, ca.SX(0), ca.SX(0)), length)
+    return ca.Function("ccr_disk_gap_length", [angle], [ca.cse(ca.vertcat(slope, ca.gradient(slope, angle)))])
 
 
 def node_problem(

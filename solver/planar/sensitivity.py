@@ -1,18 +1,25 @@
 """Derivatives of an equilibrium in the cable displacements, the robot's length and its obstacles.
 
-They follow from the implicit function theorem at the active set: one factorisation of the optimality conditions of
-eq. 5, whose derivatives are those of :mod:`solver.planar.formulation`, and one back-substitution for each parameter.
+They follow from the implicit function theorem at the active set: one factorisation of the optimality conditions, and
+one back-substitution for each parameter. The kernel does so in its own coordinates. :func:`dense_sensitivity` does so
+with the conditions of eq. 5 in node coordinates, whose derivatives are those of :mod:`solver.planar.formulation`: it
+shares nothing with the kernel and checks it.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from solver import _kernel
 from solver.common.implicit import ParameterRows, respond
+from solver.common.scene import Scene
+from solver.common.slopes import KernelSlopes
 from solver.common.validation import check_instance
 from solver.planar.equilibrium import Equilibrium
 from solver.planar.formulation import MOTIONS, kkt_derivatives, robot_inequality_count
+from solver.planar.layout import layout
 from solver.planar.robot import Robot
+from solver.planar.solve import kernel_robot, kernel_scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +64,9 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
         equilibrium: A stable equilibrium. In the paper's model the cable must be pulled, as the shear of a slack robot
             is undetermined.
         active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier. Adding
-            one that only just touches gives the derivative on the side where it is pressed.
+            one that only just touches gives the derivative on the side where it is pressed. Of contacts by default that
+            depend on each other, such as three of a link that lies flush on a side, those that the others imply keep
+            their multipliers.
 
     Raises:
         ValueError: If the cable of the paper's model is not pulled, or ``active`` has the wrong shape, or contacts that
@@ -65,9 +74,28 @@ def sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> S
         TypeError: If ``equilibrium`` is not one of the plane.
     """
     check_instance("equilibrium", equilibrium, Equilibrium, "for one in space call solver.spatial.spatial_sensitivity")
-    robot, scene = equilibrium.robot, equilibrium.scene
-    if robot.model == "paper" and not equilibrium.cable_mm > 0:
+    if equilibrium.robot.model == "paper" and not equilibrium.cable_mm > 0:
         raise ValueError(f"cable_mm is {equilibrium.cable_mm}; it must be positive, for the shear to be determined")
+    slopes = _kernel_slopes(equilibrium, active)
+    return dense_sensitivity(equilibrium, active) if slopes is None else Sensitivity(*slopes)
+
+
+def _make_kernel(robot: Robot, scene: Scene) -> _kernel.Kernel:
+    return _kernel.Kernel(kernel_robot(robot), kernel_scene(robot, scene))
+
+
+_kernel_slopes = KernelSlopes(_make_kernel, layout)
+
+
+def dense_sensitivity(equilibrium: Equilibrium, active: np.ndarray | None = None) -> Sensitivity:
+    """Differentiate as :func:`sensitivity`, by the dense optimality conditions in node coordinates.
+
+    They have no contacts of the clamped base, which matters where an obstacle on a spring rests on it.
+
+    Raises:
+        ValueError: If ``active`` has the wrong shape, or contacts that cannot all be closed at once.
+    """
+    robot, scene = equilibrium.robot, equilibrium.scene
     rows, kkt = Sensitivity.rows(robot), kkt_derivatives(robot, scene.laws, scene.mounted)
     closed = equilibrium.inequality_multipliers[: robot_inequality_count(robot)] > 0  # taut cables, disks that meet
     change = respond(equilibrium, kkt, active, closed.tolist())

@@ -164,6 +164,18 @@ def cable_hessian_function() -> ca.Function:
     return ca.Function("ccr_spatial_cable_hessian", [control, hole, numbers], [ca.cse(_triangle(hessian))])
 
 
+def cable_length_function() -> ca.Function:
+    """Return ``(u, hole, shared) → slopes in log l0 of that distance and of its slope``, ``(4,)`` [mm]."""
+    control, hole = ca.SX.sym("control", 3), ca.SX.sym("hole", 3)
+    numbers, shared = _symbols()
+    ahead, aside, ahead_slope, aside_slope = _cable(control, hole, shared)
+    size = ca.sqrt(ahead**2 + (hole[2] * aside) ** 2)
+    slope = (ahead * ahead_slope + hole[2] ** 2 * aside * aside_slope) / size
+    chord = ca.vertcat(numbers[:3], ca.SX.zeros(NUMBERS - 3))  # of the shared values only c grows with the length
+    law = ca.jtimes(ca.vertcat(size, slope), numbers, chord)
+    return ca.Function("ccr_spatial_cable_length", [control, hole, numbers], [ca.cse(ca.densify(law))])
+
+
 def _cable(control: ca.SX, hole: ca.SX, shared: Shared) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Return how far a cable runs ahead in the frame halfway, and by the twist aside, with their slopes.
 

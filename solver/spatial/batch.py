@@ -3,7 +3,7 @@
 import numpy as np
 
 from solver import _kernel
-from solver.common.batch import RobotBatch
+from solver.common.batch_slopes import SlopeBatch
 from solver.common.layout import Layout
 from solver.common.scene import Scene
 from solver.common.status import Status
@@ -12,10 +12,10 @@ from solver.spatial.robot import SpatialRobot
 from solver.spatial.solve import kernel_robot, kernel_scene
 
 
-class SpatialBatchSolver(RobotBatch[SpatialRobot, SpatialEquilibrium]):
+class SpatialBatchSolver(SlopeBatch[SpatialRobot, SpatialEquilibrium]):
     """Moves many robots in space by one call, with the results of :class:`solver.spatial.SpatialSolver`.
 
-    See :class:`~solver.common.batch.RobotBatch`.
+    See :class:`~solver.common.batch.RobotBatch` and :meth:`~solver.common.batch_slopes.SlopeBatch.slopes`.
     """
 
     space = 3

@@ -178,6 +178,44 @@ def hessian_contraction_function() -> ca.Function:
     return ca.Function("ccr_hessian_contraction", [*segment.inputs, force, moment], [ca.cse(ca.densify(law))])
 
 
+def input_contraction_function() -> ca.Function:
+    """Return ``(control, bending, pulls, l0, holes, force, moment) → slopes of the law in its inputs``, ``(21,)``.
+
+    The inputs are both pulls and l0. First the slopes in l0 of the chord and of the rotation of the upper disk, as
+    those of :func:`bend_function`; then the second derivatives of what :func:`hessian_contraction_function` contracts,
+    of control (rows) and inputs (columns), row by row, and the lower triangle of those in the inputs alone.
+    """
+    segment, force, moment = _Segment(), ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
+    control, bending, inputs = segment.control, segment.bending, ca.vertcat(segment.pulls, segment.length)
+    everything = ca.vertcat(control, bending, inputs)
+    squares, multipliers, weights = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
+    _, rates, curvatures = (
+        ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True)
+    )
+    work = ca.dot(weights, squares) + ca.dot(force, segment.chord)
+    axis = ca.jacobian(segment.axis, everything)
+    moments = axis.T @ segment.turning.T @ moment  # slope of the work of the moment
+    inverse = _inverse(ca.jacobian(segment.closure, bending))
+    lengths = inverse.T @ (ca.gradient(work, bending) + moments[3:5])
+    hessian, _ = ca.hessian(work - ca.dot(multipliers, segment.closure), everything)
+    hessian = ca.substitute(hessian, multipliers, lengths)
+    hessian = ca.substitute(hessian, weights, rates)
+    moment_slope, square_slope = ca.jacobian(moments, everything), ca.jacobian(squares, everything)
+    hessian += (moment_slope + moment_slope.T) / 2 + square_slope.T @ ca.diag(curvatures) @ square_slope
+    bent, bent_by_inputs = (-inverse @ ca.jacobian(segment.closure, of) for of in (control, inputs))
+    along_control = ca.vertcat(ca.SX.eye(3), bent, ca.SX.zeros(3, 3))
+    along_inputs = ca.vertcat(ca.SX.zeros(3, 3), bent_by_inputs, ca.SX.eye(3))
+    by_length = along_inputs[:, 2]
+    own = along_inputs.T @ hessian @ along_inputs
+    law = ca.vertcat(
+        ca.jacobian(segment.chord, everything) @ by_length,
+        segment.turning @ axis @ by_length,
+        ca.vec((along_control.T @ hessian @ along_inputs).T),
+        *(own[row, column] for row in range(3) for column in range(row + 1)),
+    )
+    return ca.Function("ccr_input_contraction", [*segment.inputs, force, moment], [ca.cse(ca.densify(law))])
+
+
 def _inverse(matrix: ca.SX) -> ca.SX:
     """Return the inverse of a 2 × 2 matrix."""
     (a, b), (c, d) = ca.vertsplit(matrix[0, :].T), ca.vertsplit(matrix[1, :].T)

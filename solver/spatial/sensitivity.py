@@ -1,19 +1,24 @@
 """Derivatives of an equilibrium in space in the cable displacements, the robot's length and its obstacles.
 
-They follow from the implicit function theorem at the active set of eq. 13 or of the rod's problem, as in the plane.
+They follow from the implicit function theorem at the active set of eq. 13 or of the rod's problem, as in the plane:
+from the kernel, and for comparison from the dense optimality conditions in node coordinates.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from solver import _kernel
 from solver.common.implicit import ParameterRows, respond
+from solver.common.scene import Scene
+from solver.common.slopes import KernelSlopes
 from solver.common.validation import check_instance
-from solver.spatial.equilibrium import SpatialEquilibrium
+from solver.spatial.equilibrium import SpatialEquilibrium, spatial_layout
 from solver.spatial.formulation import kkt_derivatives
 from solver.spatial.obstacle_terms import MOTIONS
 from solver.spatial.robot import SpatialRobot, sides
 from solver.spatial.rod_formulation import rod_inequality_count
+from solver.spatial.solve import kernel_robot, kernel_scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +60,8 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
     Args:
         equilibrium: A stable equilibrium, in the paper's model with a pulled cable, as the shear of a slack robot is
             undetermined.
-        active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier.
+        active: Which contacts stay closed, ``(m, p, k)`` bool; ``None`` for those with a positive multiplier, as in
+            the plane.
 
     Raises:
         ValueError: If no cable of the paper's model is pulled, or ``active`` has the wrong shape, or contacts that
@@ -63,9 +69,28 @@ def spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | No
         TypeError: If ``equilibrium`` is not one in space.
     """
     check_instance("equilibrium", equilibrium, SpatialEquilibrium, "take one of a solver in space")
-    robot, scene = equilibrium.robot, equilibrium.scene
-    if robot.model == "paper" and not equilibrium.cables_mm.any():
+    if equilibrium.robot.model == "paper" and not equilibrium.cables_mm.any():
         raise ValueError("cables_mm is (0, 0); one must be pulled, for the shear to be determined")
+    slopes = _kernel_slopes(equilibrium, active)
+    return dense_spatial_sensitivity(equilibrium, active) if slopes is None else SpatialSensitivity(*slopes)
+
+
+def _make_kernel(robot: SpatialRobot, scene: Scene) -> _kernel.SpatialKernel:
+    return _kernel.SpatialKernel(kernel_robot(robot), kernel_scene(robot, scene))
+
+
+_kernel_slopes = KernelSlopes(_make_kernel, spatial_layout)
+
+
+def dense_spatial_sensitivity(equilibrium: SpatialEquilibrium, active: np.ndarray | None = None) -> SpatialSensitivity:
+    """Differentiate as :func:`spatial_sensitivity`, by the dense optimality conditions in node coordinates.
+
+    They have no contacts of the clamped base, which matters where an obstacle on a spring rests on it.
+
+    Raises:
+        ValueError: If ``active`` has the wrong shape, or contacts that cannot all be closed at once.
+    """
+    robot, scene = equilibrium.robot, equilibrium.scene
     rows, closed = SpatialSensitivity.rows(robot), equilibrium.inequality_multipliers[: rod_inequality_count(robot)] > 0
     change = respond(equilibrium, kkt_derivatives(robot, scene.laws, scene.mounted), active, closed.tolist())
     loads = change.loads

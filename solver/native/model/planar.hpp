@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "math/riccati.hpp"
+#include "model/law_slopes.hpp"
 #include "model/robot.hpp"
 #include "model/rod_cables.hpp"
 #include "model/segment.hpp"
@@ -43,6 +44,7 @@ class Planar {
   static constexpr int kState = 3;   // x, y, disk angle
   static constexpr bool kRod = Law::kRod;
   static constexpr int kCables = kRod ? kMaxCables : 1;
+  static constexpr int kInputs = kRod ? 1 : 2;  // of the segment law that change: the paper's cable, the length
   static constexpr int kDiskSides = 2;  // on which the disks of a segment can meet: that of +x at rest, and the other
   static constexpr int kTip = 3;        // slopes of the free tip: x, y, angle
 
@@ -89,6 +91,12 @@ class Planar {
   Control disk_slope(int, const DiskGap& gap) const requires(kRod) { return {{gap.slope}}; }
   Vec<1> disk_moment(int segment, const DiskGap& gap) const requires(kRod) { return {{-gap.slope}}; }
   Mat<1, 1> disk_curvature(int segment, const DiskGap& gap) const requires(kRod) { return {{gap.curvature}}; }
+  // Slope of the gap in the length of the robot, and that one's in the control.
+  LengthSlope<Control> disk_length_slope(int segment, int side) const requires(kRod);
+
+  // Slopes in the inputs of the segment law; follows lagrangian_hessian.
+  void input_slopes(const Command& command, const std::vector<Control>& controls, InputSlopes<Planar>& slopes) const;
+
   // Sine of the shear angle at which a segment folds over.
   double widest_shear() const { return kRod ? HUGE_VAL : 1 - displacement_ / length_; }
   double free_turn() const { return displacement_ / robot_.offset; }  // approximate angle of a free segment

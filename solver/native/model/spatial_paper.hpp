@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "math/riccati.hpp"
+#include "model/law_slopes.hpp"
 #include "model/robot.hpp"
 #include "model/segment.hpp"
 #include "model/spatial_chain.hpp"
@@ -17,6 +18,7 @@ class SpatialPaper {
   static constexpr int kSpace = 3, kTurn = 3, kControl = 3, kCables = 2;
   static constexpr int kState = 6;  // position, and small rotation about the axes of the base frame
   static constexpr bool kRod = false;
+  static constexpr int kInputs = 3;  // of the segment law that change: both cables, the length
   static constexpr int kShears = 2;  // leading controls that shear a segment
   static constexpr int kTip =
       10;  // slopes of the free tip in each displacement: position, and rotation towards both cables
@@ -46,6 +48,10 @@ class SpatialPaper {
 
   bool has_free_form() const { return true; }
   Vec<kTip> free_slopes(const Command& command) const;
+
+  // Slopes in the inputs of the segment law; follows lagrangian_hessian.
+  void input_slopes(const Command& command, const std::vector<Control>& controls,
+                    InputSlopes<SpatialPaper>& slopes) const;
 
   // Sine of the shear angle at which a segment folds over.
   double widest_shear() const { return 1; }

@@ -6,6 +6,7 @@
 
 #include "math/riccati.hpp"
 #include "model/arc.hpp"
+#include "model/law_slopes.hpp"
 #include "model/robot.hpp"
 #include "model/rod_cables.hpp"
 #include "model/spatial_chain.hpp"
@@ -18,6 +19,7 @@ class SpatialRod {
   static constexpr int kSpace = 3, kTurn = 3, kControl = 3, kCables = kMaxCables;
   static constexpr int kState = 6;  // position, and small rotation about the axes of the base frame
   static constexpr bool kRod = true;
+  static constexpr int kInputs = 1;     // of the segment law that change: the length
   static constexpr int kShears = 3;     // controls that damping is measured by
   static constexpr int kDiskSides = 1;  // the disks of a segment can meet on whatever side it bends to
   static constexpr int kTip = 0;        // slopes of the free tip, which this model does not have
@@ -60,6 +62,13 @@ class SpatialRod {
   Control disk_slope(int segment, const DiskGap& gap) const;
   Vec<3> disk_moment(int segment, const DiskGap& gap) const;
   Mat<3, 3> disk_curvature(int segment, const DiskGap& gap) const;
+
+  // Slope of the gap in the length of the robot, and that one's in the control.
+  LengthSlope<Control> disk_length_slope(int segment, int side) const;
+
+  // Slopes in the inputs of the segment law; follows lagrangian_hessian.
+  void input_slopes(const Command& command, const std::vector<Control>& controls,
+                    InputSlopes<SpatialRod>& slopes) const;
 
   double widest_shear() const { return HUGE_VAL; }
   double free_turn() const { return 0; }

@@ -78,11 +78,30 @@ bool ActiveSetQp<Model>::balance(const ContactProblem& problem, KktSystem& kkt, 
   return true;
 }
 
+template <class Model>
+double ActiveSetQp<Model>::hold(const ContactProblem& problem, KktSystem& kkt, ActiveSet& held) {
+  for (int j = 0; j < held.count; ++j) loads_[j] = linearize_gap(problem, held.contact[j], j, 0);
+  kkt.solve(problem, std::span(loads_).first(held.count));
+  while (factor_gram(held) == Gram::kDependent) remove_contact(held, dependent_, held.count);
+  double least = 1;
+  for (int j = 0; j < held.count; ++j) least = std::min(least, std::abs(gram_[j][j] / along(j, responses_[j])));
+  return least;
+}
+
+template <class Model>
+void ActiveSetQp<Model>::close(int count, Multipliers& changes, Direction& response) const {
+  for (int j = 0; j < count; ++j) changes[j] = -changes[j] - along(j, response);
+  solve_gram(count, changes);
+  for (int j = 0; j < count; ++j) response.add(changes[j], responses_[j]);
+}
+
 #define CCR_INSTANTIATE(Model)                                                                                    \
   template bool ActiveSetQp<Model>::find_softest(const ContactProblem&, KktSystem&, const ActiveSet&, Direction&, \
                                                  Direction&);                                                     \
   template int ActiveSetQp<Model>::exchange_dependent(const ContactProblem&, KktSystem&, int, ActiveSet&);        \
-  template bool ActiveSetQp<Model>::balance(const ContactProblem&, KktSystem&, ActiveSet&, Direction&);
+  template bool ActiveSetQp<Model>::balance(const ContactProblem&, KktSystem&, ActiveSet&, Direction&);           \
+  template double ActiveSetQp<Model>::hold(const ContactProblem&, KktSystem&, ActiveSet&);                        \
+  template void ActiveSetQp<Model>::close(int, Multipliers&, Direction&) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

@@ -52,13 +52,22 @@ class ActiveSetQp {
   // one that which could not be added, with multipliers ν >= 0 that balance each other, Σ ν ∇c = 0. Empty otherwise.
   const ActiveSet& conflict() const { return conflict_; }
 
+  using Multipliers = std::array<double, tolerances::kMaxActive>;
+
+  // Factors the system of gaps that stay closed; leaves out those whose slopes depend on those before. Curvature of any
+  // sign is accepted. Returns the least curvature that one adds, over that of the gap alone: how far they are from
+  // depending on each other.
+  double hold(const ContactProblem& problem, KktSystem& kkt, ActiveSet& held);
+  // Completes a response at fixed multipliers to one that keeps the gaps of the last `hold` closed, in whose order
+  // `changes` holds how each changes at a fixed shape. Leaves the changes of their multipliers there.
+  void close(int count, Multipliers& changes, Direction& response) const;
+
   // Finds a further step near the last solve, on its active set and with its factorisation. False where a multiplier
   // would be negative.
   bool correct(const ContactProblem& problem, KktSystem& kkt, ActiveSet& active, Direction& step);
 
  private:
   enum class Gram { kSound, kDependent, kUnstable };
-  using Multipliers = std::array<double, tolerances::kMaxActive>;
   using Load = typename KktSystem::Load;
 
   double along(int j, const Direction& d) const { return slopes_[j].along(d); }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "math/linalg.hpp"
+#include "model/law_slopes.hpp"
 #include "model/obstacle.hpp"
 #include "model/robot.hpp"
 #include "tolerances.hpp"
@@ -184,6 +185,25 @@ class ContactProblem {
   Gap<kSpace> gap(int contact) const;                        // with derivatives in the point
   Force force(int contact, const Position& on_point) const;  // on the nodes, equivalent to one on the point
   Slope slope(int contact) const;
+
+  // How points, gaps and loads change with parameters; these follow lagrangian_hessian. Motions of an obstacle are its
+  // shifts along the axes, its turns about its centre, and its growth.
+  static constexpr int kMotions = kSpace + Model::kTurn + 1;
+  Position velocity(int contact, const std::vector<State>& rates) const;  // of its point, where nodes move at rates
+  // Adds the change of -λ∇c in the lower state beside a point between nodes, where the upper state moves by itself.
+  void add_coupling(int contact, double multiplier, std::vector<InputSlope<Model>>& segments) const;
+  GapRate<kSpace> gap_rate(int contact, int motion, const Gap<kSpace>& gap) const;
+  // Adds the slope of the loads in the length to that of the Lagrangian in the states of the nodes.
+  void add_load_growth(std::vector<State>& node_slopes) const;
+  void input_slopes(const Iterate& at, InputSlopes<Model>& slopes) const {
+    model_.input_slopes(at.command, at.controls, slopes);
+  }
+  int disk_segment(int contact) const { return (contact - first_disk_contact()) / std::max(1, Model::kDiskSides); }
+  LengthSlope<Control> disk_length_slope(int contact) const requires(Model::kRod) {
+    return model_.disk_length_slope(disk_segment(contact),
+                                    (contact - first_disk_contact()) % std::max(1, Model::kDiskSides));
+  }
+
   int mounts() const { return static_cast<int>(springs_.size()); }
   int mount(int contact) const { return contact >= contacts() ? -1 : mount_of_[contact / points_.size()]; }
   int mount_of(int obstacle) const { return mount_of_[obstacle]; }
@@ -237,7 +257,6 @@ class ContactProblem {
   void place_all() const;
   void measure_slacks_and_disks(const Command& command) requires(Model::kRod);
   void push_disks(const ActiveSet& active) requires(Model::kRod);
-  int disk_segment(int contact) const { return (contact - first_disk_contact()) / Model::kDiskSides; }
   DiskGap disk_gap(int contact) const requires(Model::kRod) {
     return model_.disk_gap(disk_segment(contact), (contact - first_disk_contact()) % Model::kDiskSides);
   }

@@ -22,6 +22,12 @@ struct Ramp {
   double length;            // of the backbone [mm]
 };
 
+// How slopes were found. Left out are gaps that the others imply.
+struct SlopeResult {
+  bool found = false;  // not where H is singular, closed gaps all but depend on each other, or there are too many
+  int left_out = 0;
+};
+
 // The continuation of one robot in the plane or in space, for scenes of a fixed number of obstacles. Holds scratch
 // memory and no state between calls: an equilibrium is a block of numbers, laid out as `layout` says.
 template <int D>
@@ -68,6 +74,15 @@ class Continuation {
   // Returns how well the equilibrium in a block meets its KKT conditions, evaluated anew from coordinates and
   // multipliers.
   virtual Optimality optimality(const double* block) = 0;
+
+  // Numbers of a row of `slopes`, and of these rows.
+  virtual int slope_row() const = 0;
+  virtual int parameters() const = 0;
+
+  // Writes the slopes of the equilibrium in a block in its command, and also in its obstacles or not; see
+  // solve/slopes.hpp. The contacts stay closed that `held` names with an entry for each, or where it is null those that
+  // press.
+  virtual SlopeResult slopes(const double* block, const bool* held, bool in_obstacles, double* to) = 0;
 };
 
 // Makes the continuation of a robot's model. The number of obstacles is that of every scene.

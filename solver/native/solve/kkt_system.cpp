@@ -200,6 +200,21 @@ void KktSystem<Model>::solve(const ContactProblem& problem, std::span<const Load
   }
 }
 
+template <class Model>
+void KktSystem<Model>::respond(std::span<const Forcing> forcings) {
+  while (!forcings.empty()) {
+    const auto some = forcings.first(std::min(forcings.size(), loads_.size()));
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      const auto& [gradient, forces, response] = some[k];
+      loads_[k] = {gradient, forces, response->controls.data(), response->states.data()};
+    }
+    system_.respond(std::span(loads_).first(some.size()));
+    if (!mount_hessian_.empty())
+      for (const Forcing& forcing : some) couple_mounts(*forcing.response);
+    forcings = forcings.subspan(some.size());
+  }
+}
+
 #define CCR_INSTANTIATE(Model)      \
   template struct Direction<Model>; \
   template class KktSystem<Model>;

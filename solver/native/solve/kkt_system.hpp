@@ -46,11 +46,21 @@ class KktSystem {
   // Solves for several right-hand sides: H⁻¹ times the gradient of a gap, or -H⁻¹ times that of the Lagrangian.
   void solve(const ContactProblem& problem, std::span<const Load> loads);
 
-  std::int64_t factorizations = 0;                         // so far
-  int negative = 0;                                        // eigenvalues at the last factor
-  bool counts_inertia = Model::kRod;                       // whether H may have negative eigenvalues
-  double penalty(int j) const { return penalty_[j]; }      // on the j-th active gap
-  double max_curvature() const { return max_curvature_; }  // of a shear
+  // The same for a gradient in the controls, or where that is null forces on the nodes. The response holds the
+  // right-hand side of the mounts, and receives the solution.
+  struct Forcing {
+    const typename Model::Control* gradient;
+    std::span<const typename Model::System::Force> forces;
+    Direction* response;
+  };
+  void respond(std::span<const Forcing> forcings);
+
+  const typename Model::System& system() const { return system_; }  // without the mounts
+  std::int64_t factorizations = 0;                                  // so far
+  int negative = 0;                                                 // eigenvalues at the last factor
+  bool counts_inertia = Model::kRod;                                // whether H may have negative eigenvalues
+  double penalty(int j) const { return penalty_[j]; }               // on the j-th active gap
+  double max_curvature() const { return max_curvature_; }           // of a shear
 
  private:
   static constexpr int kSpace = Model::kSpace;

@@ -3,17 +3,19 @@
 // continues the branch), passage (whether the robot passed through an obstacle), motion (obstacles that move),
 // tension_limit (stalls and yielding motors), kept_tension (motors at their limit while others go on), conflict (cables
 // that pull against each other), descent (what happens after the end of a branch), ramp (whether a pull reaches a
-// force).
+// force), derivatives (slopes in the parameters).
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "solve/continuation.hpp"
 #include "solve/newton.hpp"
+#include "solve/slopes.hpp"
 
 namespace ccr {
 
@@ -53,6 +55,9 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) override;
   bool ramp_reaches_force(const Ramp& ramp, double* reached) override;
   Optimality optimality(const double* block) override;
+  int slope_row() const override;
+  int parameters() const override;
+  SlopeResult slopes(const double* block, const bool* held, bool in_obstacles, double* to) override;
 
  private:
   enum class Move { kAccepted, kRejected, kOverTension, kPushing };
@@ -201,6 +206,8 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   double energy_below(const Command& ceiling) const;
   bool trial_is_close() const;
 
+  bool find_held(const bool* held, ActiveSet& gaps) const;
+
   BlockLayout layout_;
   Newton<Model> newton_;
   ContactProblem& problem_ = newton_.problem;
@@ -245,6 +252,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool motors_yield_ = false;  // whether those that would have to hold more than the limit let their cables out on it
   Tensions descent_kept_{};    // tensions that motors kept there
   int last_yielded_ = -1;      // the cable that a motor let out last on it
+  std::unique_ptr<Slopes<Model>> slopes_;  // made when slopes are asked for
 };
 
 // The largest of some numbers.

@@ -1,0 +1,113 @@
+// Derivatives of an equilibrium in its parameters, by the implicit function theorem at its active set: one
+// factorisation of the KKT system, and one right-hand side for each parameter.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "solve/active_set_qp.hpp"
+#include "solve/contact_problem.hpp"
+#include "solve/kkt_system.hpp"
+
+namespace ccr {
+
+// Numbers of a row: slopes of the node poses, in space also of the rotations of the disks about the base frame's axes;
+// then of multipliers, tensions, forces of the obstacles and their displacements, as fields of a block.
+template <class Model>
+struct SlopeRow {
+  SlopeRow(int segments, int contacts, int cables, int obstacles)
+      : nodes(3 * (segments + 1)),
+        turns(Model::kSpace == 3 ? nodes : 0),
+        contacts(contacts),
+        cables(cables),
+        forces(Model::kSpace * obstacles) {}
+  int size() const { return nodes + turns + contacts + cables + 2 * forces; }
+
+  int nodes, turns, contacts, cables, forces;
+};
+
+// The parameters are the displacement of each cable, the length, and of each obstacle its motions: shifts, turns about
+// its centre, growth. The Hessian has no penalty and no damping; its eigenvalues may have any sign.
+template <class Model>
+class Slopes {
+ public:
+  using ContactProblem = ccr::ContactProblem<Model>;
+  using Iterate = ccr::Iterate<Model>;
+  static constexpr int kMotions = ContactProblem::kMotions;
+
+  Slopes(int segments, int mounts);
+  int mounts() const { return mounts_; }
+
+  // Writes a row for each parameter, with those of the obstacles or not, at an equilibrium at which the problem has its
+  // gradient, while the gaps in `held` stay closed. Leaves out those that the others imply, whose multipliers keep
+  // still, and returns their number; -1 where the Hessian is singular, or gaps all but
+  // depend on each other, as those of cables that lock a robot.
+  int differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held, bool in_obstacles,
+                    double* rows);
+
+ private:
+  static constexpr int kSpace = Model::kSpace, kInputs = Model::kInputs, kCables = Model::kCables;
+  using Position = ccr::Position<kSpace>;
+  using State = typename Model::State;
+  using Control = typename Model::Control;
+  using Direction = ccr::Direction<Model>;
+  using KktSystem = ccr::KktSystem<Model>;
+  using Multipliers = typename ActiveSetQp<Model>::Multipliers;
+
+  // A contact that presses or is held.
+  struct Touch {
+    int contact, obstacle, mount;
+    double multiplier;
+    int held;  // index among the held gaps, -1 if it is not held
+    Gap<kSpace> gap;
+  };
+
+  // What changes with an input of the segment laws at fixed controls, mounts and multipliers.
+  struct Input {
+    std::vector<State> moved;        // states of the nodes
+    std::vector<State> node_slopes;  // slope of the Lagrangian in these,
+    std::vector<Control> gradient;   // in the controls
+    std::vector<Position> mounts;    // and in the mounts
+    Multipliers gaps;                // of the held gaps
+  };
+
+  // The right-hand side of a parameter, and its solution.
+  struct Row {
+    Row(int segments, int mounts) : response(segments, mounts) {}
+    int parameter;
+    int input, obstacle;                // -1 for none
+    Vec<kCables> tensions;              // slopes of the Lagrangian's slopes in the cables, at fixed unknowns
+    std::vector<GapRate<kSpace>> gaps;  // of each touching contact, by the motion of its obstacle
+    std::vector<typename Model::System::Force> forces;
+    Direction response;
+    Multipliers changes;  // of the held gaps, then of their multipliers
+  };
+
+  void find_touches(const ContactProblem& problem, const Iterate& at);
+  void find_input(const ContactProblem& problem, const Iterate& at, int number);
+  void move_nodes(const std::vector<InputSlope<Model>>& laws, Input& input) const;
+  void pull_back(const std::vector<InputSlope<Model>>& laws, Input& input) const;
+  void add_own_gaps(const ContactProblem& problem, const ActiveSet& active, Input& input) const;
+  void find_within();
+  void add_cable_rows(int contacts, int cables);
+  void add_obstacle_row(const ContactProblem& problem, int obstacle, int motion, int first);
+  Row& add_row(int parameter, int input, int obstacle);
+  void respond();
+  void finish(const ContactProblem& problem, const Iterate& at, Row& row, double* to) const;
+  double tension_slope(const Row& row, int cable) const;
+  void write_forces(const ContactProblem& problem, const Row& row, double* to) const;
+
+  int segments_, mounts_;
+  KktSystem kkt_;
+  ActiveSetQp<Model> qp_;
+  InputSlopes<Model> laws_;
+  std::array<Input, kInputs> inputs_;
+  Mat<kInputs, kInputs> within_;  // second derivatives of the Lagrangian in the inputs, at fixed controls
+  ActiveSet held_;                // the gaps that stay closed
+  std::vector<Touch> touches_;
+  std::vector<Row> rows_;
+  int used_ = 0;  // of the rows
+  std::vector<typename KktSystem::Forcing> forcings_;
+};
+
+}  // namespace ccr
