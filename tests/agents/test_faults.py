@@ -169,9 +169,8 @@ def limited(size):
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
-@pytest.mark.parametrize(
-    ("size", "file"), [pytest.param(100, "config.json", marks=pytest.mark.long), (4000, "checkpoint.safetensors")]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("size", "file"), [(100, "config.json"), (4000, "checkpoint.safetensors")])
 def test_training_on_a_full_disk_goes_on_when_there_is_space(size, file, tmp_path):
     run = tmp_path / "run"
     code, lines = ended(started("train", "--run", run, *SMALL, preexec_fn=limited(size)))

@@ -381,7 +381,9 @@ def first_scores(file, env_id):
     return scores(LearnedPolicy(file), env_id, EVALUATION_SEED, SCENES, sensing=sensing_of(env_id), split="test")
 
 
-@pytest.mark.parametrize("name", sorted(SCORES))
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if k % 2 else []) for k, name in enumerate(sorted(SCORES))]
+)
 def test_shipped_policies_give_the_numbers_of_the_table(name):
     """``scores.json`` is what ``ccr-gym evaluate`` wrote of their first test scenes."""
     policy, env_id = name.split()

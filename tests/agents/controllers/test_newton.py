@@ -14,7 +14,9 @@ def test_what_is_hidden_is_enough_to_be_exact(env_id):
     assert np.median([np.median(episode.error[-20:]) for episode in played]) < 0.01
 
 
-@pytest.mark.parametrize("env_id", ["CCR/PushObstacle-v1", "CCR/InsertAndPush-v1"])
+@pytest.mark.parametrize(
+    "env_id", ["CCR/PushObstacle-v1", pytest.param("CCR/InsertAndPush-v1", marks=pytest.mark.long)]
+)
 def test_without_what_is_hidden_newton_is_exact_if_nothing_is_and_far_from_the_oracle_else(env_id):
     (ideal,) = run_episodes(NewtonController(), env_id, seed=50, count=1)
     assert ideal.error[-1] < 1e-6

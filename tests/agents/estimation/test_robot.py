@@ -71,7 +71,7 @@ def test_the_force_on_one_of_two_obstacles_is_told_from_that_on_the_other(sensin
 
 
 @pytest.mark.parametrize("sensing", ["realistic", "sensorless"])
-@pytest.mark.parametrize("env_id", ["CCR/TrackForce-v1", "CCR/MovingObstacle-v1"])
+@pytest.mark.parametrize("env_id", [pytest.param("CCR/TrackForce-v1", marks=pytest.mark.long), "CCR/MovingObstacle-v1"])
 def test_what_is_known_stays_true_in_long_episodes(env_id, sensing):
     """Where a motor creeps through its play, or a robot stalls, which way the cable last moved is not known."""
     known, truth, touching, wrong = probed(env_id, sensing, 120, length=128)

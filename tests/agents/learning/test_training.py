@@ -288,7 +288,9 @@ def test_a_finished_run_whose_policy_is_damaged_says_so(tmp_path):
     LearnedPolicy(train(config, progress=False))
 
 
-@pytest.mark.parametrize("learner", [SMALL["PPO"], IMITATION], ids=lambda s: s.name)
+@pytest.mark.parametrize(
+    "learner", [SMALL["PPO"], pytest.param(IMITATION, marks=pytest.mark.long)], ids=lambda s: s.name
+)
 def test_only_the_event_files_of_the_run_are_deleted(tmp_path, monkeypatch, learner):
     monkeypatch.setattr(distillation, "VALIDATION_EPISODES", 2)
     config = TrainConfig(run=tmp_path, learner=learner, threads=1)

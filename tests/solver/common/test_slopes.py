@@ -51,7 +51,7 @@ def is_comparable(equilibrium):
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 20), marks=pytest.mark.long)], ids=["some", "many"])
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 20), marks=pytest.mark.long)], ids=["some", "many"])
 def test_slopes_are_those_of_the_dense_conditions(model, seeds):
     compared = 0
     for seed in seeds:
