@@ -18,12 +18,12 @@ from solver.common.validation import LARGEST, check_array, check_finite, check_i
 from solver.planar.equilibrium import Equilibrium
 from solver.planar.estimators import (
     Motion,
+    arc_slopes,
     force_factor,
     free_motion,
     node_slopes,
     point_forces,
     shape_motion,
-    sinc_slope,
 )
 from solver.planar.robot import Robot
 from solver.planar.sensitivity import sensitivity
@@ -126,10 +126,10 @@ def _turning_motion(nominal: Equilibrium, nodes: np.ndarray) -> tuple[Motion, np
     ends = np.unique(reach)
     turns = (segments < ends[:, None]) / (ends[:, None] * robot.offset_mm)  # a cable at the offset moves by about 1 mm
     angles = -np.diff(nodes[:, 2])
-    stretch = sinc_slope(angles / 2) / (2 * np.sinc(angles / (2 * np.pi)))  # c'/c, of the chord in the angle
-    slopes = node_slopes(np.diff(nodes[:, :2], axis=0), stretch * turns, turns)
     holes = np.array([cable.hole_mm[0] for cable in cables])[:, None]
-    taken = np.where(segments < reach[:, None], holes * np.cos(angles / 2) - length * sinc_slope(angles / 2) / 2, 0.0)
+    stretch, taken = arc_slopes(angles, holes, length)
+    slopes = node_slopes(np.diff(nodes[:, :2], axis=0), stretch * turns, turns)
+    taken = np.where(segments < reach[:, None], taken, 0.0)
     moments = robot.rigidity * bending_ratios(robot) * (angles - np.broadcast_to(robot.precurvature, len(angles)))
     return Motion(nodes, slopes, turns @ moments / length), turns @ taken.T, _load_works(robot, length, nodes, slopes)
 

@@ -208,8 +208,7 @@ def shape_motion(robot: Robot, nodes: np.ndarray, cable_mm: np.ndarray, length_m
     ahead, angles = np.diff(nodes[..., :2], axis=-2), -np.diff(nodes[..., 2], axis=-1)
     length, pull = length_mm[..., None] / robot.segments, cable_mm[..., None] / robot.segments
     if robot.model == "rod":
-        stretch = sinc_slope(angles / 2) / (2 * np.sinc(angles / (2 * np.pi)))  # c'/c, of the chord in the angle
-        taken = robot.offset_mm * np.cos(angles / 2) - length * sinc_slope(angles / 2) / 2
+        stretch, taken = arc_slopes(angles, robot.offset_mm, length)
         turns = np.broadcast_to(1 / taken.sum(axis=-1, keepdims=True), angles.shape)
     else:
         bisector = nodes[..., :-1, 2] - angles / 2
@@ -274,10 +273,24 @@ def _free_segment(robot: Robot, pull: np.ndarray, length: np.ndarray) -> tuple[n
     half = pull / (2 * offset)
     for _ in range(NEWTON_ITERATIONS):
         taken = length * (1 - np.sinc(half / np.pi)) + 2 * offset * np.sin(half)
-        half = half - (taken - pull) / (2 * offset * np.cos(half) - length * sinc_slope(half))
+        half = half - (taken - pull) / (2 * offset * np.cos(half) - length * _sinc_slope(half))
     return 2 * half, length * np.sinc(half / np.pi)
 
 
-def sinc_slope(half: np.ndarray) -> np.ndarray:
+def arc_slopes(
+    angles: np.ndarray, holes_mm: float | np.ndarray, length_mm: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return, of segments of a rod, the slopes in their angles of the logarithm of the chord and of the cable taken up.
+
+    Args:
+        angles: Angles between their disks, ``(..., n)`` [rad].
+        holes_mm: Distances of the cables from the backbone, broadcast with the angles [mm].
+        length_mm: Lengths of the segments, likewise [mm].
+    """
+    slope = _sinc_slope(angles / 2)
+    return slope / (2 * np.sinc(angles / (2 * np.pi))), holes_mm * np.cos(angles / 2) - length_mm * slope / 2
+
+
+def _sinc_slope(half: np.ndarray) -> np.ndarray:
     """Return the derivative of sin h / h."""
     return np.asarray((np.cos(half) - np.sinc(half / np.pi)) / np.where(half == 0, 1.0, half))

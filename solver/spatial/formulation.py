@@ -157,23 +157,8 @@ def hessian_contraction_function() -> ca.Function:
     disk, in the frame of the lower one, with the bending that the closure determines.
     """
     segment, force, moment = _Segment(), ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
-    control, bending = segment.control, segment.bending
-    both = ca.vertcat(control, bending)
-    squares, multipliers, weights = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
-    _, rates, curvatures = (
-        ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True)
-    )
-    work = ca.dot(weights, squares) + ca.dot(force, segment.chord)
-    axis = ca.jacobian(segment.axis, both)
-    moments = axis.T @ segment.turning.T @ moment  # slope of the work of the moment
-    inverse = _inverse(ca.jacobian(segment.closure, bending))
-    lengths = inverse.T @ (ca.gradient(work, bending) + moments[3:])
-    hessian, _ = ca.hessian(work - ca.dot(multipliers, segment.closure), both)
-    hessian = ca.substitute(hessian, multipliers, lengths)
-    hessian = ca.substitute(hessian, weights, rates)
-    moment_slope, square_slope = ca.jacobian(moments, both), ca.jacobian(squares, both)
-    hessian += (moment_slope + moment_slope.T) / 2 + square_slope.T @ ca.diag(curvatures) @ square_slope
-    along = ca.vertcat(ca.SX.eye(3), -inverse @ ca.jacobian(segment.closure, control))
+    hessian, _, inverse = _contraction(segment, force, moment, ca.vertcat(segment.control, segment.bending))
+    along = ca.vertcat(ca.SX.eye(3), -inverse @ ca.jacobian(segment.closure, segment.control))
     law = ca.vec(along.T @ hessian @ along)
     return ca.Function("ccr_hessian_contraction", [*segment.inputs, force, moment], [ca.cse(ca.densify(law))])
 
@@ -186,22 +171,9 @@ def input_contraction_function() -> ca.Function:
     of control (rows) and inputs (columns), row by row, and the lower triangle of those in the inputs alone.
     """
     segment, force, moment = _Segment(), ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
-    control, bending, inputs = segment.control, segment.bending, ca.vertcat(segment.pulls, segment.length)
-    everything = ca.vertcat(control, bending, inputs)
-    squares, multipliers, weights = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
-    _, rates, curvatures = (
-        ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True)
-    )
-    work = ca.dot(weights, squares) + ca.dot(force, segment.chord)
-    axis = ca.jacobian(segment.axis, everything)
-    moments = axis.T @ segment.turning.T @ moment  # slope of the work of the moment
-    inverse = _inverse(ca.jacobian(segment.closure, bending))
-    lengths = inverse.T @ (ca.gradient(work, bending) + moments[3:5])
-    hessian, _ = ca.hessian(work - ca.dot(multipliers, segment.closure), everything)
-    hessian = ca.substitute(hessian, multipliers, lengths)
-    hessian = ca.substitute(hessian, weights, rates)
-    moment_slope, square_slope = ca.jacobian(moments, everything), ca.jacobian(squares, everything)
-    hessian += (moment_slope + moment_slope.T) / 2 + square_slope.T @ ca.diag(curvatures) @ square_slope
+    control, inputs = segment.control, ca.vertcat(segment.pulls, segment.length)
+    everything = ca.vertcat(control, segment.bending, inputs)
+    hessian, axis, inverse = _contraction(segment, force, moment, everything)
     bent, bent_by_inputs = (-inverse @ ca.jacobian(segment.closure, of) for of in (control, inputs))
     along_control = ca.vertcat(ca.SX.eye(3), bent, ca.SX.zeros(3, 3))
     along_inputs = ca.vertcat(ca.SX.zeros(3, 3), bent_by_inputs, ca.SX.eye(3))
@@ -214,6 +186,36 @@ def input_contraction_function() -> ca.Function:
         *(own[row, column] for row in range(3) for column in range(row + 1)),
     )
     return ca.Function("ccr_input_contraction", [*segment.inputs, force, moment], [ca.cse(ca.densify(law))])
+
+
+def _contraction(segment: _Segment, force: ca.SX, moment: ca.SX, of: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return the Hessian of :func:`hessian_contraction_function` before the closure determines the bending.
+
+    Args:
+        segment: The segment.
+        force: Force on its chord, ``(3,)``.
+        moment: Moment on the rotation of its upper disk, ``(3,)``.
+        of: In what it is: the control, the bending, and what may follow, ``(v,)``.
+
+    Returns:
+        The Hessian, ``(v, v)``, the slopes of the rotation vector, ``(3, v)``, and the inverse of those of the closure
+        in the bending, ``(2, 2)``.
+    """
+    squares, multipliers, weights = segment.squares, ca.SX.sym("lengths", 2), ca.SX.sym("rates", 2)
+    _, rates, curvatures = (
+        ca.vertcat(*parts) for parts in zip(*(square_angle(q) for q in ca.vertsplit(squares)), strict=True)
+    )
+    work = ca.dot(weights, squares) + ca.dot(force, segment.chord)
+    axis = ca.jacobian(segment.axis, of)
+    moments = axis.T @ segment.turning.T @ moment  # slope of the work of the moment
+    inverse = _inverse(ca.jacobian(segment.closure, segment.bending))
+    lengths = inverse.T @ (ca.gradient(work, segment.bending) + moments[3:5])
+    hessian, _ = ca.hessian(work - ca.dot(multipliers, segment.closure), of)
+    hessian = ca.substitute(hessian, multipliers, lengths)
+    hessian = ca.substitute(hessian, weights, rates)
+    moment_slope, square_slope = ca.jacobian(moments, of), ca.jacobian(squares, of)
+    hessian += (moment_slope + moment_slope.T) / 2 + square_slope.T @ ca.diag(curvatures) @ square_slope
+    return hessian, axis, inverse
 
 
 def _inverse(matrix: ca.SX) -> ca.SX:
