@@ -118,7 +118,9 @@ inline constexpr int kShearingIterations = 1000;  // the same of the paper's mod
 inline constexpr int kFinishEvery = 8;            // iterates between trials of Newton's method
 inline constexpr double kDescentCap = 0.03;       // largest step of one iterate
 inline constexpr int kLongDescent = 100;          // iterates, after which those of the paper's models may be
-inline constexpr double kDescentStride = 0.1;     // as large as this
+inline constexpr double kDescentStride = 0.1;     // as large as this, and those of the rod which move too far
+inline constexpr double kFilled = 0.9;            // are shortened to this part of kDescentMove,
+inline constexpr double kFar = 0.5;               // and do not count from this part on
 inline constexpr double kSmallestPart =
     1e-3;  // smallest first step of a descent, as a fraction of the sub-step that ended the branch
 inline constexpr double kCreep = 1e-4;    // size of an iterate that hardly moves

@@ -38,14 +38,18 @@ ModelContinuation<Model>::End ModelContinuation<Model>::descend_from_end(const C
   problem_.enable_barrier(true);
   bool moved = newton_.set_metric(present_) && leave_towards(command), folded = false;
   constexpr int kIterations = Model::kRod ? kDescentIterations : kShearingIterations;
-  for (int i = 0; i < kIterations && moved && !work_is_spent(); ++i) {
+  const double least = kFar * kDescentMove * problem_.robot().max_length;
+  int far = 0;  // iterates that fill their room, which do not count
+  for (int i = 0; i - far < kIterations && moved && !work_is_spent(); ++i) {
     std::swap(present_, trial_);
     const bool held_one = hold_first_beyond(ceiling);
     record_shape();
     if ((held_one || hold_beyond(ceiling)) && !newton_.set_metric(present_)) break;
     const bool finished = i % kFinishEvery == kFinishEvery - 1 && try_newton(ceiling);
-    const bool strides = !Model::kRod && i >= kLongDescent;
-    const bool ended = finished || descend_once(strides ? kDescentStride : kDescentCap, ceiling, moved);
+    const bool is_long = i >= kLongDescent, fills = is_long && Model::kRod;
+    const bool ended =
+        finished || descend_once(is_long && !fills ? kDescentStride : kDescentCap, fills, ceiling, moved);
+    far += fills && !ended && moved && largest_motion() >= least;
     folded = !finished && problem_.in_barrier();
     if (!ended) continue;
     if (folded && !try_newton(ceiling)) break;
@@ -242,13 +246,15 @@ bool ModelContinuation<Model>::buckle_at(const Command& command) {
 
 // One iterate of the descent from `present_` to `trial_`, of at most a size, shortened until nothing is jumped over,
 // and no cable comes in so far beyond its ceiling that energy is gained; by the step of a definite Hessian where that
-// of the present one leads nowhere. True at an equilibrium.
+// of the present one leads nowhere. Where it is to fill its room, one that moved too far is first shortened to just
+// that. True at an equilibrium.
 template <class Model>
-bool ModelContinuation<Model>::descend_once(double cap, const Command& ceiling, bool& moved) {
+bool ModelContinuation<Model>::descend_once(double cap, bool fills, const Command& ceiling, bool& moved) {
   moved = false;
   if (is_interrupted() || !problem_.evaluate(present_)) return false;
   const double before = energy_below(ceiling);
-  for (int shortening = 0; shortening < kDescentShortenings; ++shortening, cap /= 4) {
+  int attempts = kDescentShortenings;
+  for (int attempt = 1; attempt <= attempts; ++attempt) {
     trial_ = present_;
     ++result_.iterations;
     NewtonResult found = newton_.descend_once(trial_, cap, false);
@@ -259,8 +265,11 @@ bool ModelContinuation<Model>::descend_once(double cap, const Command& ceiling, 
     moved = found.moved;
     if (found.converged) return true;
     if (!moved) return false;
-    const bool shortest = shortening == kDescentShortenings - 1;
+    const bool shortest = attempt == attempts;
     if (trial_is_close() && (shortest || cable_beyond(ceiling) < 0 || energy_below(ceiling) < before)) return false;
+    const double room = fills && attempt == 1 ? kDescentMove * problem_.robot().max_length / largest_motion() : 1.0;
+    attempts += room < 1;
+    cap *= room < 1 ? std::max(kFilled * room, 0.25) : 0.25;
   }
   moved = false;
   return false;

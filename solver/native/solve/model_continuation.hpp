@@ -201,7 +201,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool change_sides(const Command& command);
   bool restore_at(const Command& command, bool holding);
   bool buckle_at(const Command& command);
-  bool descend_once(double cap, const Command& ceiling, bool& moved);
+  bool descend_once(double cap, bool fills, const Command& ceiling, bool& moved);
   bool try_newton(const Command& ceiling);
   double energy_below(const Command& ceiling) const;
   bool trial_is_close() const;

@@ -8,7 +8,7 @@ import pytest
 from soak.episodes import Episode, setting_of
 from soak.walks import sample_increments, walk
 
-from solver import Cable, Circle, Robot, Scene, Solver, Status
+from solver import Cable, Circle, Ellipse, Polygon, Robot, Scene, Solver, Status
 
 PAIR = (Cable(), Cable(angle=math.pi))
 SMALL = Robot(length_mm=18.0, segments=9, offset_mm=0.8, rigidity=50.0, max_tension=15.0, between=1, cables=PAIR)
@@ -152,3 +152,33 @@ def test_a_stall_is_where_a_repeated_command_leads_no_farther(robot, peg, comman
     assert stalled.tensions.max() == pytest.approx(robot.max_tension, rel=1.1e-6)
     assert again.cables_mm == pytest.approx(stalled.cables_mm, abs=1e-4 * robot.offset_mm)
     assert again.length_mm == pytest.approx(stalled.length_mm, abs=1e-4 * robot.length_mm)
+
+
+def test_a_snap_goes_on_until_a_soft_obstacle_that_it_carried_along_is_home_again():
+    """The robot takes it as far as it is long, and lets it go: hundreds of iterates of a descent."""
+    robot = Robot(
+        length_mm=1800.0,
+        segments=9,
+        offset_mm=80.0,
+        rigidity=5e5,
+        max_tension=100.0,
+        model="rod",
+        between=1,
+        touch=("backbone", "cable"),
+        cables=(
+            Cable(end=5),
+            Cable(angle=math.pi, end=5),
+            Cable(offset_mm=66.6),
+            Cable(angle=math.pi, offset_mm=48.2),
+        ),
+    )
+    fixed = Ellipse(center=(420.0, 1300.0), radii=(205.0, 112.0), axis=(-0.6, -0.8))
+    corners = ((324.0, 1202.0), (285.0, 1016.0), (500.0, 1005.0), (500.0, 1174.0))
+    soft = Polygon(corners=corners, radius=120.0, spring=1e-5)
+    solver, command = Solver(robot, Scene([fixed, soft])), (-142.0, 129.0, -94.0, 62.0)
+    before = solver.step(solver.rest(), (43.0, -47.0, 195.0, -155.0))
+    away = np.linalg.norm(solver.trace(before, command).displacements[:, 1], axis=1)
+    assert solver.step(before, command).status is Status.SNAPPED
+    assert before.contact[1].any()
+    assert away.max() > 0.9 * robot.length_mm
+    assert away[-1] == pytest.approx(0, abs=1e-9)
