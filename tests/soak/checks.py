@@ -286,7 +286,8 @@ def _is_pinched(state, command):
 def _blocked(solver, taken, tally):
     """Report blocked steps that another way passes, or that no limit to what presses explains.
 
-    No motor limits the base: where closed gaps alone keep the robot from being fed or drawn, it is blocked.
+    No motor limits the base: where closed gaps alone keep the robot from being fed or drawn, it is blocked. A repeated
+    step comes closer to where they balance.
     """
     blocked = np.flatnonzero([state.status == Status.BLOCKED for state in taken.states[1:]])
     tally.blocked += len(blocked)
@@ -295,27 +296,29 @@ def _blocked(solver, taken, tally):
         return findings
     for k in blocked[:MOST_BLOCKED].tolist():
         after, command = taken.states[k + 1], taken.commands[k]
-        passed = _other_ways(solver, taken, k)
+        ends = [state for state in (after, step(solver, after, command)) if state.status == Status.BLOCKED]
+        wedged = any(is_wedged(state, command) for state in ends)
+        passed = _other_ways(solver, taken, k, wedged)
         tally.blocked_unconfirmed += passed
-        if passed or command[-1] == after.length_mm or not is_wedged(after, command):
+        if passed or command[-1] == after.length_mm or not wedged:
             kind = "blocked, but reached another way" if passed else "blocked"
             findings.append(Finding(kind, k, after.factorizations))
     return findings
 
 
-def _other_ways(solver, taken, k):
+def _other_ways(solver, taken, k, wedged):
     """Return whether a blocked command, or its tension limit, is reached in small steps or in another way.
 
     That from rest may go round the other side of what keeps a robot where closed gaps balance each other.
     """
-    before, after, command = taken.states[k], taken.states[k + 1], taken.commands[k]
+    before, command = taken.states[k], taken.commands[k]
     start = command_of(before)
     small = np.linspace(start, command, 41)[1:]
     corner = [np.array([command[0], *start[1:]]), command]
     straight = np.linspace(command_of(solver.rest()), command, 81)[1:]
     if _passes(solver, before, small) or _passes(solver, before, corner):
         return True
-    return _passes(solver, solver.rest(), straight) and not is_wedged(after, command)
+    return not wedged and _passes(solver, solver.rest(), straight)
 
 
 def _passes(solver, state, commands):
