@@ -97,6 +97,7 @@ inline constexpr int kOnsetParts = 1 << 20;  // of the way, to one of which it i
 inline constexpr double kTensionBand = 1e-6;
 inline constexpr double kTight = 100.0;      // tension over EI/aL from which sub-steps below kSmallestStep are tried
 inline constexpr double kTightStep = 1e-11;  // the smallest of them [a]
+inline constexpr int kCreeps = 3;            // descents from such sub-steps, after which one goes farther
 inline constexpr double kRefining = 1e-2;    // of the sub-step before a branch counts as ended, where nothing leads on
 inline constexpr double kBalance = 1e-5;  // residual of multipliers that balance each other, over the largest of them
 inline constexpr double kPeakStep = 1.25e-3;  // sub-step within which a peak of the tension is ignored [a]

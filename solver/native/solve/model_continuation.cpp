@@ -21,6 +21,7 @@ struct ModelContinuation<Model>::Pursuit {
   bool holds = false;        // whether obstacles have pressed the cable to its limit, which is not pulled meanwhile
   bool refined = false;      // whether the last sub-step was rejected: the next one must not grow at once
   double finest = kSmallestStep;  // sub-step before the branch counts as ended
+  int crept = 0;                  // descents from the finest sub-steps, since one as large as kSmallestStep succeeded
   bool snapped = false;           // whether the robot has
   Status reached = Status::kConverged;
   bool over = false;  // with `reached`
@@ -186,7 +187,10 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     accept();
     step = pursuit.refined ? size : std::min(2 * size, kLargestStep);
     pursuit.refined = false;
-    if (size >= kSmallestStep) pursuit.finest = kSmallestStep;
+    if (size >= kSmallestStep) {
+      pursuit.finest = kSmallestStep;
+      pursuit.crept = 0;
+    }
   } else if (move == Move::kOverTension) {
     const bool may_fall = !stalled && size > kSmallestStep && is_at_tension_limit() && gap_closed();
     stalled = stalled || (!may_fall && approach_tension_limit());
@@ -198,11 +202,14 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     stalled = true;
     over_limit_ = {};
   } else {
-    // Cables that no limit stops buckle the robot, farther than roundoff in its energy hides.
+    // Cables that no limit stops buckle the robot, farther than roundoff in its energy hides. Nor does a descent from
+    // the finest sub-steps leave a branch that ends within roundoff: after some, it goes farther.
     const bool buckles = conflict == Conflict::kBlocked && size < kPatientStep;
-    const double part = buckles ? std::min(1.0, kPatientStep / remaining) : 0.0;
-    const End end = descend_from_end(buckles ? between(present_.command, goal, part) : next,
+    const double least = buckles ? kPatientStep : pursuit.crept >= kCreeps ? kSmallestStep : 0.0;
+    const double part = std::min(1.0, least / remaining);
+    const End end = descend_from_end(least > size ? between(present_.command, goal, part) : next,
                                      ceiling(pursuit.wanted, goal, size / remaining));
+    pursuit.crept += size <= kTightStep;
     if (end == End::kStuck) {
       const bool stopped = conflict == Conflict::kBlocked || is_blocked(next);
       return refine(pursuit, size, stopped || (moves_obstacles(next) && result_.reason == Reason::kStuck));

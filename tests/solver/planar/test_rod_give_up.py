@@ -105,6 +105,15 @@ def test_a_descent_does_not_creep_along_a_contact_that_it_must_leave():
     assert max(state.status for state in states) < Status.GAVE_UP
 
 
+def test_a_robot_that_is_held_tight_snaps_beyond_the_end_of_its_branch_instead_of_creeping_along_it():
+    """In a channel, cables that no limit stops: it was followed by 6e-12 of the offset at a time."""
+    setting, generator = setting_of(Episode("sections", 1300, 356, 500))
+    increments = sample_increments(generator, setting.solver, setting.scale, 500)
+    states = walk(setting.solver, increments[:18]).states
+    assert states[-1].status is Status.SNAPPED
+    assert states[-1].length_mm == pytest.approx(180)
+
+
 @pytest.mark.parametrize("start", [(-0.404340139, -0.595947961), (-1.0, -1.0), (-0.4, -0.6)])
 @pytest.mark.parametrize("command", [(0.0118121596, 0.01740968), (0.01, 0.015), (0.01, 0.02)])
 def test_cables_that_are_pulled_from_slack_buckle_the_robot_however_little(start, command):
