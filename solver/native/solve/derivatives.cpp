@@ -43,9 +43,10 @@ bool ModelContinuation<Model>::find_held(const bool* held, ActiveSet& gaps) cons
 
 template <class Model>
 Slopes<Model>& ModelContinuation<Model>::prepare_slopes() {
-  if (!slopes_ || slopes_->mounts() != problem_.mounts())
-    slopes_ = std::make_unique<Slopes<Model>>(problem_.robot().segments, problem_.mounts());
-  return *slopes_;
+  const std::size_t mounts = problem_.mounts();
+  if (slopes_.size() <= mounts) slopes_.resize(mounts + 1);
+  if (!slopes_[mounts]) slopes_[mounts] = std::make_unique<Slopes<Model>>(problem_.robot().segments, mounts);
+  return *slopes_[mounts];
 }
 
 template <class Model>
@@ -127,14 +128,15 @@ void ModelContinuation<Model>::find_loose(ActiveSet& held, ActiveSet& loose) con
 template <class Model>
 int ModelContinuation<Model>::misjudged(const ActiveSet& held, const ActiveSet& loose, const Tensions& motion) const {
   if (loose.count == 0) return -1;
+  const Slopes<Model>& slopes = *slopes_[problem_.mounts()];
   const Robot& robot = problem_.robot();
   const double travel = kAlong * largest_displacement(motion) / robot.offset;
   const auto begin = held.contact.begin(), end = begin + held.count;
   for (int j = 0; j < loose.count; ++j) {
     const int contact = loose.contact[j];
     const bool wrong = std::find(begin, end, contact) == end
-                           ? slopes_->gap_along(problem_, contact, motion) < -travel * robot.max_length
-                           : slopes_->multiplier_along(contact, motion) * problem_.lever_arm(contact) < -travel;
+                           ? slopes.gap_along(problem_, contact, motion) < -travel * robot.max_length
+                           : slopes.multiplier_along(contact, motion) * problem_.lever_arm(contact) < -travel;
     if (wrong) return contact;
   }
   return -1;

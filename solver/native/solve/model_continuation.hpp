@@ -258,7 +258,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool motors_yield_ = false;  // whether those that would have to hold more than the limit let their cables out on it
   Tensions descent_kept_{};    // tensions that motors kept there
   int last_yielded_ = -1;      // the cable that a motor let out last on it
-  std::unique_ptr<Slopes<Model>> slopes_;  // made when slopes are asked for
+  std::vector<std::unique_ptr<Slopes<Model>>> slopes_;  // for each number of mounts, made when slopes are asked for
 };
 
 // The largest of some numbers.

@@ -91,7 +91,7 @@ void Slopes<Model>::find_input(const ContactProblem& problem, const Iterate& at,
   for (const Touch& touch : touches_)
     if (touch.multiplier != 0) problem.add_coupling(touch.contact, touch.multiplier, laws_.segment[number]);
   move_nodes(laws_.segment[number], input);
-  if (Model::kRod && problem.has_loads()) problem.add_load_growth(input.node_slopes);
+  if (Model::kRod && problem.has_loads()) problem.add_load_growth(input.node_slopes, load_forces_);
   pull_back(laws_.segment[number], input);
   for (int m = 0; m < mounts_; ++m) {
     input.mounts[m] = is_length ? times(problem.spring(m), at.mounts[m]) : Position{};

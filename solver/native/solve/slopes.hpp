@@ -44,8 +44,6 @@ class Slopes {
   static constexpr int kMotions = ContactProblem::kMotions;
 
   Slopes(int segments, int mounts);
-  int mounts() const { return mounts_; }
-
   // Writes a row for each parameter that is asked for, at an equilibrium at which the problem has its gradient, while
   // the gaps in `held` stay closed. Leaves out those that the others imply, whose multipliers keep still, and returns
   // their number; -1 where the Hessian is singular, or gaps all but depend on each other, as those of cables that lock
@@ -125,6 +123,7 @@ class Slopes {
   Mat<kInputs, kInputs> within_;  // second derivatives of the Lagrangian in the inputs, at fixed controls
   ActiveSet held_;                // the gaps that stay closed
   std::vector<Touch> touches_;
+  std::vector<State> load_forces_;  // scratch
   std::vector<Row> rows_;
   int used_ = 0;  // of the rows
   std::vector<typename KktSystem::Forcing> forcings_;
