@@ -1,4 +1,4 @@
-"""Slopes of sampled states, against the dense optimality conditions and against differences of the kernel's own steps."""
+"""Slopes of sampled states, against the dense optimality conditions and against differences of the kernel's steps."""
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -155,7 +155,9 @@ def _turned(obstacle, axis, by):
         matrix = np.eye(3)
         matrix[one, one] = matrix[other, other] = cosine
         matrix[one, other], matrix[other, one] = -sine, sine
-    points = {name: np.array(getattr(obstacle, name)) for name in ("start", "end", "corners") if hasattr(obstacle, name)}
+    points = {
+        name: np.array(getattr(obstacle, name)) for name in ("start", "end", "corners") if hasattr(obstacle, name)
+    }
     moved = {name: center + (value - center) @ matrix.T for name, value in points.items()}
     as_tuples = {name: tuple(map(tuple, value)) if value.ndim == 2 else tuple(value) for name, value in moved.items()}
     return replace(obstacle, **as_tuples)
@@ -167,7 +169,9 @@ def _differentiate(state, ways):
     A step that is too large, where the active set changes, is halved; two in a row are needed.
     """
     size, change = ways
-    stronger = replace(state.robot, max_tension=10 * state.robot.max_tension)  # motors at their limit hold a little more
+    stronger = replace(
+        state.robot, max_tension=10 * state.robot.max_tension
+    )  # motors at their limit hold a little more
     kernel, rows, reason = make_solver(stronger, state.scene)._kernel, [], ""
     for k in range(HALVINGS):
         step = size / 2**k
@@ -226,7 +230,9 @@ def _alike(state, block):
     layout = state._layout
     same = np.array_equal(layout.multipliers(block) > 0, layout.multipliers(state.block) > 0)
     same = same and np.array_equal(layout.tensions(block) > 0, layout.tensions(state.block) > 0)
-    return same and np.array_equal(np.sign(layout.disk_multipliers(block)), np.sign(layout.disk_multipliers(state.block)))
+    return same and np.array_equal(
+        np.sign(layout.disk_multipliers(block)), np.sign(layout.disk_multipliers(state.block))
+    )
 
 
 def _outputs(state, block):
