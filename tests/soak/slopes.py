@@ -173,9 +173,15 @@ def _differentiate(state, ways):
         state.robot, max_tension=10 * state.robot.max_tension
     )  # motors at their limit hold a little more
     kernel, rows, reason = make_solver(stronger, state.scene)._kernel, [], ""
+    compiled = planar_scene if isinstance(state.robot, Robot) else spatial_scene
+    here = compiled(state.robot, state.scene)
     for k in range(HALVINGS):
         step = size / 2**k
-        near = [_solve(kernel, state, *change(sign * step)) for sign in (1, -1)]
+        near = []
+        for sign in (1, -1):
+            command, scene = change(sign * step)
+            there = here if scene is state.scene else compiled(state.robot, scene)
+            near.append(_solve(kernel, state, command, here, there))
         if isinstance(near[0], str) or isinstance(near[1], str):
             rows, reason = [], next(one for one in near if isinstance(one, str))
             continue
@@ -201,16 +207,14 @@ def _best(rows):
     return best
 
 
-def _solve(kernel, state, command, scene):
-    """Return the equilibrium near a state with other parameters, by part, or why there is none.
+def _solve(kernel, state, command, here, there):
+    """Return the equilibrium near a state with another command and obstacles, by part, or why there is none.
 
     It is approached once more from a little farther on, so that the last steps of Newton's method take it well below
     the tolerance of a single step.
     """
-    compiled = planar_scene if isinstance(state.robot, Robot) else spatial_scene
-    here, there = (compiled(state.robot, one) for one in (state.scene, scene))
-    still = [0.0] * len(scene)
-    bounds = still if scene is state.scene else [1.0] * len(scene)
+    still = [0.0] * len(here)
+    bounds = still if there is here else [1.0] * len(here)
     wanted = np.array([*state.cables_mm, state.length_mm]) + command
     beside = wanted.copy()
     beside[0] += 1e-3 * state.robot.offset_mm
