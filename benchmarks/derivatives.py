@@ -1,14 +1,13 @@
 """Count the instructions of steps with and without their derivatives, on two drives of the scenes of PushObstacle.
 
 Needs valgrind. ``python benchmarks/derivatives.py`` prints the ratio of derivatives to steps for each model and drive:
-of the slopes in the command that a step finds as it ends, and of all slopes of its equilibrium, for the obstacle too.
+of the slopes in the cable and in all parameters that a step finds as it ends, and of those of its equilibrium alone.
 """
 
 import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import gymnasium
@@ -75,15 +74,15 @@ def main() -> None:
                 steps = [step for seed, scene in enumerate(scenes()) for step in drive(robot, scene, seed)]
                 touching = np.mean([step.end.contact.any() for step in steps])
                 write(steps, path := folder / f"{model}_{drive.__name__}")
-                alone = {}
-                for mode in ("read", "step", "derivatives", "slopes"):
-                    alone[mode] = count(program, path, mode)
-                taken = {mode: after - before for (_, before), (mode, after) in pairwise(alone.items())}
-                step = taken["step"]
-                of_step, of_slopes = taken["derivatives"], alone["slopes"] - alone["step"]
+                read, step, derivatives, in_all, slopes = (
+                    count(program, path, what) for what in ("read", "step", "derivatives", "all", "slopes")
+                )
+                ratios = [(more - step) / (step - read) for more in (derivatives, in_all, slopes)]
                 print(
-                    f"{model}, {drive.__name__}, {touching:.0%} in contact: {step:,.0f} instructions per step; "
-                    f"derivatives in the command {of_step / step:.2f}, all slopes {of_slopes / step:.2f} of that"
+                    f"{model}, {drive.__name__}, {touching:.0%} in contact: {step - read:,.0f} instructions per step; "
+                    "derivatives in the cable {:.2f}, in all parameters {:.2f}, of the equilibrium {:.2f}".format(
+                        *ratios
+                    )
                 )
 
 

@@ -1,6 +1,6 @@
 // Replays recorded steps of the kernel for tools that count instructions: replay FILE [WHAT], written by
-// instructions.py. WHAT: read, nothing else; step, by default; derivatives, of each step in its command; slopes, of
-// each equilibrium reached in all parameters.
+// instructions.py. WHAT is read, nothing else; step, by default; derivatives, of each step in its cables; all, of each
+// step in all parameters; slopes, the same of each equilibrium reached, after the step.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -35,7 +35,8 @@ class Recording {
 template <int D>
 int replay(Recording& recording, const char* what) {
   const auto is = [what](const char* name) { return std::strcmp(what, name) == 0; };
-  const bool reads = is("read"), differentiates = is("derivatives"), slopes = is("slopes");
+  const bool reads = is("read"), in_all = is("all"), differentiates = is("derivatives") || in_all,
+             slopes = is("slopes");
   ccr::testing::RobotNumbers numbers;
   numbers.cables = recording.numbers(recording.count());
   numbers.rod = !numbers.cables.empty();
@@ -62,7 +63,8 @@ int replay(Recording& recording, const char* what) {
       const std::vector<double> command = recording.numbers(continuation->layout().cables.size + 1),
                                 from = recording.numbers(to.size());
       if (reads) continue;
-      const ccr::StepSlopes wanted{.rows = differentiates ? rows.data() : nullptr, .in_length = false};
+      const ccr::StepSlopes wanted{
+          .rows = differentiates ? rows.data() : nullptr, .in_length = in_all, .in_obstacles = in_all};
       continuation->follow(from.data(), command.data(), to.data(), wanted);
       if (slopes) continuation->slopes(to.data(), nullptr, true, rows.data());
     }

@@ -62,6 +62,19 @@ class Stepped {
     return outputs(reached);
   }
 
+  // Rows of a step in all parameters, and those that the equilibrium has by itself.
+  std::vector<double> step_rows(const std::vector<double>& command) {
+    std::vector<double> rows(static_cast<std::size_t>(continuation_->parameters()) * width());
+    const StepSlopes slopes{.rows = rows.data(), .in_length = true, .in_obstacles = true};
+    REQUIRE(continuation_->follow(block.data(), command.data(), block.data(), slopes).differentiated);
+    return rows;
+  }
+  std::vector<double> own_rows() {
+    std::vector<double> rows(static_cast<std::size_t>(continuation_->parameters()) * (width() - 1));
+    REQUIRE(continuation_->slopes(block.data(), nullptr, true, rows.data()).found);
+    return rows;
+  }
+
   // Row of the slopes in a cable, or in the length after them.
   const double* row(std::size_t parameter) const { return rows_.data() + parameter * width(); }
   double field(const BlockField& of, std::size_t k) const { return block[of.offset + k]; }
@@ -197,6 +210,32 @@ TEST_CASE("slopes of steps in space are differences, with and without contact") 
     REQUIRE(clear.go(pulled).differentiated);
     REQUIRE(clear.field(clear.layout().force, 0) == 0);
     check_differences(clear, pulled, 0);
+  }
+}
+
+TEST_CASE("slopes of a step in all parameters are those of its equilibrium") {
+  for (const bool rod : {false, true}) {
+    CAPTURE(rod);
+    RobotNumbers of;
+    of.rod = rod;
+    const Robot robot = make_robot<2>(of);
+    for (const double x : {44.0, 80.0}) {  // in contact, and clear
+      Stepped<2> stepped(of, {circle(robot, x, 104, 15), circle(robot, 150, 60, 10, 0.5)});
+      stepped.go({6, of.length});
+      const std::vector<double> rows = stepped.step_rows({6.5, of.length}), own = stepped.own_rows();
+      REQUIRE((stepped.field(stepped.layout().force, 0) != 0) == (x == 44.0));
+      const int width = stepped.width(), count = static_cast<int>(rows.size()) / width;
+      for (int row = 0; row < count; ++row)
+        for (int k = 0; k + 1 < width; ++k)
+          CHECK(rows[row * width + k] == doctest::Approx(own[row * (width - 1) + k]).epsilon(1e-9));
+      // The gap of a circle changes by as much as the circle moves along it, or grows; nothing else moves.
+      const auto clearance = [&](int motion) { return rows[(2 + motion) * width + width - 1]; };
+      if (x == 44.0) continue;
+      CHECK(std::hypot(clearance(0), clearance(1)) == doctest::Approx(1).epsilon(0.2));
+      CHECK(clearance(2) == doctest::Approx(0));
+      CHECK(clearance(3) < -0.9);
+      CHECK(clearance(4) == 0);
+    }
   }
 }
 

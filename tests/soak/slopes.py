@@ -18,7 +18,8 @@ KINDS = ("circles", "shapes", "springs", "channel"), ("spheres", "shapes", "spri
 STEPS, STATES = 160, 48  # of a walk, and taken of it
 PULLED = 0.1  # least displacement over the offset that determines the shear of the paper's model
 BRINK = 100.0  # largest slope of a node in the command, beyond which a robot is about to snap or locked by its cables
-HALVINGS = 4  # of the step of a difference
+STEP_SIZES = 4  # of a difference, each a quarter of the last
+UNSURE = 1e-7  # estimated error of a difference, over the largest slope, from which on it proves nothing
 ROUNDOFF = 1e-12  # slope that is none: of a robot whose cables are all slack
 PARTS = ("nodes", "turns", "multipliers", "tensions", "forces", "displacements")
 
@@ -90,7 +91,10 @@ def _compare(found, generator, state, name):
         if isinstance(differences, str):
             found.left_out[differences] += 1
             continue
-        errors = {part: _row_error(slopes[part], row, differences[part]) for part in names}
+        if any(_over(unsure, slopes[part], row) > UNSURE for part, (_, unsure) in differences.items()):
+            found.left_out["kinked or too curved for differences"] += 1
+            continue
+        errors = {part: _over(slopes[part][row] - differences[part][0], slopes[part], row) for part in names}
         found.differences.append(max(errors.values()))
         found.note(found.differences[-1], "difference", *name, row, max(errors, key=errors.get))
 
@@ -100,10 +104,10 @@ def _error(slopes, exact):
     return np.abs(slopes - exact).max(initial=0) / (largest if largest > ROUNDOFF else 1)
 
 
-def _row_error(slopes, row, differences):
-    """Return the error of a row, over its largest slope, or over a hundredth of the largest in any row."""
+def _over(errors, slopes, row):
+    """Return the largest error of a row, over its largest slope, or over a hundredth of the largest in any row."""
     largest = max(np.abs(slopes[row]).max(initial=0), np.abs(slopes).max(initial=0) / 100)
-    return np.abs(slopes[row] - differences).max(initial=0) / (largest if largest > ROUNDOFF else 1)
+    return np.abs(errors).max(initial=0) / (largest if largest > ROUNDOFF else 1)
 
 
 # Differences.
@@ -166,7 +170,7 @@ def _turned(obstacle, axis, by):
 def _differentiate(state, ways):
     """Return differences extrapolated to none, by part, or why there are none.
 
-    A step that is too large, where the active set changes, is halved; two in a row are needed.
+    Steps that are too large, where the active set changes, are left out; two in a row are needed.
     """
     size, change = ways
     stronger = replace(
@@ -175,8 +179,8 @@ def _differentiate(state, ways):
     kernel, rows, reason = make_solver(stronger, state.scene)._kernel, [], ""
     compiled = planar_scene if isinstance(state.robot, Robot) else spatial_scene
     here = compiled(state.robot, state.scene)
-    for k in range(HALVINGS):
-        step = size / 2**k
+    for k in range(STEP_SIZES):
+        step = size / 4**k
         near = []
         for sign in (1, -1):
             command, scene = change(sign * step)
@@ -187,7 +191,7 @@ def _differentiate(state, ways):
             continue
         row = [{part: (near[0][part] - near[1][part]) / (2 * step) for part in near[0]}]
         for order, before in enumerate(rows[-1] if rows else [], start=1):
-            weight = 4.0**order
+            weight = 16.0**order
             row.append({part: (weight * row[-1][part] - before[part]) / (weight - 1) for part in before})
         rows.append(row)
     if len(rows) < 2:
@@ -196,7 +200,7 @@ def _differentiate(state, ways):
 
 
 def _best(rows):
-    """Return the entry of a table of extrapolations that is closest to its neighbours."""
+    """Return the entry of a table of extrapolations that is closest to its neighbours, and how far it is from them."""
     best, least = rows[-1][0], np.inf
     for before, row in pairwise(rows):
         for order in range(1, min(len(row), len(before) + 1)):
@@ -204,7 +208,7 @@ def _best(rows):
             error = max(np.abs(row[order] - one).max(initial=0) for one in neighbours)
             if error < least:
                 best, least = row[order], error
-    return best
+    return best, least
 
 
 def _solve(kernel, state, command, here, there):

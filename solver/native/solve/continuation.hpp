@@ -28,11 +28,12 @@ struct SlopeResult {
   int left_out = 0;
 };
 
-// Where the slopes of a step in its command go: a row for each cable, and with `in_length` for the length, each of them
-// `slope_row` numbers and the slope of the clearance. None are written where `rows` is null, or none are found.
+// Where the slopes of a step go: a row for each cable, with `in_length` for the length, and with `in_obstacles` for
+// each motion of each obstacle, as those of `slopes`. Each is `slope_row` numbers and the slope of the clearance. None
+// are written where `rows` is null, or none are found.
 struct StepSlopes {
   double* rows = nullptr;
-  bool in_length = false;
+  bool in_length = false, in_obstacles = false;
 };
 
 // The continuation of one robot in the plane or in space, for scenes of a fixed number of obstacles. Holds scratch

@@ -77,7 +77,9 @@ bool ModelContinuation<Model>::differentiate_step(const Command& start, const Co
   const double* gaps = block + layout_.gaps.offset;
   const int contacts = problem_.contacts();
   const int closest = contacts > 0 ? static_cast<int>(std::min_element(gaps, gaps + contacts) - gaps) : -1;
-  if (!differentiate_towards(motion, {.length = to.in_length, .gap = true, .contact = closest}, to.rows)) return false;
+  if (!differentiate_towards(
+          motion, {.length = to.in_length, .obstacles = to.in_obstacles, .gap = true, .contact = closest}, to.rows))
+    return false;
   for (int k = 0; k < cables; ++k)
     if (std::abs(present_.command.cables[k] - target.cables[k]) > resolution)
       std::fill_n(to.rows + k * size, size, 0.0);

@@ -64,6 +64,7 @@ int Slopes<Model>::differentiate(const ContactProblem& problem, const Iterate& a
     finish(problem, at, rows_[k], to);
     if (request.contact >= 0) to[fields.size()] = gap_slope(problem, request.contact, rows_[k]);
   }
+  if (moving > 0 && request.contact >= 0) add_own_motion(problem, request.contact, rows + size - 1, size);
   return held.count - held_.count;
 }
 
@@ -177,6 +178,7 @@ Slopes<Model>::Row& Slopes<Model>::add_row(int parameter, int input, int obstacl
   row.forces.clear();
   std::fill(row.response.mounts.begin(), row.response.mounts.end(), Position{});
   std::fill_n(row.changes.begin(), held_.count, 0.0);
+  if (still_) row.response.clear();
   return row;
 }
 
@@ -227,10 +229,7 @@ void Slopes<Model>::add_obstacle_row(const ContactProblem& problem, int obstacle
 template <class Model>
 void Slopes<Model>::respond() {
   forcings_.clear();
-  if (still_) {
-    for (int k = 0; k < used_; ++k) rows_[k].response.clear();
-    return;
-  }
+  if (still_) return;
   for (int k = 0; k < used_; ++k) {
     Row& row = rows_[k];
     if (row.input >= 0)
@@ -295,9 +294,18 @@ void Slopes<Model>::finish(const ContactProblem& problem, const Iterate& at, Row
 // Slope of the gap of a contact, 0 where it is held.
 template <class Model>
 double Slopes<Model>::gap_slope(const ContactProblem& problem, int contact, const Row& row) const {
-  const auto begin = held_.contact.begin(), end = begin + held_.count;
-  if (std::find(begin, end, contact) != end) return 0;
+  if (std::count(held_.contact.begin(), held_.contact.begin() + held_.count, contact) > 0) return 0;
   return problem.slope(contact).along(row.response);
+}
+
+// Adds how the gap of a contact that is not held changes while its obstacle moves and the robot does not.
+template <class Model>
+void Slopes<Model>::add_own_motion(const ContactProblem& problem, int contact, double* slopes, int size) const {
+  if (std::count(held_.contact.begin(), held_.contact.begin() + held_.count, contact) > 0) return;
+  const int first = cables_ + (asked_ == kInputs) + kMotions * (contact / problem.robot().points());
+  const Gap<kSpace> gap = problem.gap(contact);
+  for (int motion = 0; motion < kMotions; ++motion)
+    slopes[(first + motion) * size] += problem.gap_rate(contact, motion, gap).value;
 }
 
 template <class Model>

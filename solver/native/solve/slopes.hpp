@@ -108,6 +108,7 @@ class Slopes {
   void respond();
   void finish(const ContactProblem& problem, const Iterate& at, Row& row, double* to) const;
   double gap_slope(const ContactProblem& problem, int contact, const Row& row) const;
+  void add_own_motion(const ContactProblem& problem, int contact, double* slopes, int size) const;
   double tension_slope(const Row& row, int cable) const;
   void write_forces(const ContactProblem& problem, const Row& row, double* to) const;
 
