@@ -228,12 +228,13 @@ TEST_CASE("slopes of a step in all parameters are those of its equilibrium") {
       for (int row = 0; row < count; ++row)
         for (int k = 0; k + 1 < width; ++k)
           CHECK(rows[row * width + k] == doctest::Approx(own[row * (width - 1) + k]).epsilon(1e-9));
-      // The gap of a circle changes by as much as the circle moves along it, or grows; nothing else moves.
+      // The gap (d² - r²) / 2r of a circle changes with the distance d of its centre, and with r; nothing else moves.
+      const double gap = stepped.field(stepped.layout().clearance, 0);
       const auto clearance = [&](int motion) { return rows[(2 + motion) * width + width - 1]; };
       if (x == 44.0) continue;
-      CHECK(std::hypot(clearance(0), clearance(1)) == doctest::Approx(1).epsilon(0.2));
+      CHECK(std::hypot(clearance(0), clearance(1)) == doctest::Approx(std::sqrt(1 + 2 * gap / 15)));
       CHECK(clearance(2) == doctest::Approx(0));
-      CHECK(clearance(3) < -0.9);
+      CHECK(clearance(3) == doctest::Approx(-1 - gap / 15));
       CHECK(clearance(4) == 0);
     }
   }
