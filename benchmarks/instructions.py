@@ -79,9 +79,9 @@ def build(folder: Path) -> Path:
     return folder / "replay"
 
 
-def count(program: Path, recording: Path) -> float:
-    """Return the instructions per step."""
-    command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={recording}.out", program, recording]
+def count(program: Path, recording: Path, what: str = "step") -> float:
+    """Return the instructions per step of what the program does with a recording."""
+    command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={recording}.out", program, recording, what]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     refs = re.search(r"refs:\s+([\d,]+)", done.stderr)
     assert refs is not None

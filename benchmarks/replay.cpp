@@ -1,6 +1,9 @@
-// Replays recorded steps of the kernel for tools that count instructions: replay FILE, written by instructions.py.
+// Replays recorded steps of the kernel for tools that count instructions: replay FILE [WHAT], written by
+// instructions.py. WHAT is read, nothing else; step, by default; derivatives, of each step in its cables; all, of each
+// step in all parameters; slopes, the same of each equilibrium reached, after the step.
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 #include <vector>
 
@@ -30,7 +33,10 @@ class Recording {
 
 // Replays the steps of one robot in some scenes; returns their number.
 template <int D>
-int replay(Recording& recording) {
+int replay(Recording& recording, const char* what) {
+  const auto is = [what](const char* name) { return std::strcmp(what, name) == 0; };
+  const bool reads = is("read"), in_all = is("all"), differentiates = is("derivatives") || in_all,
+             slopes = is("slopes");
   ccr::testing::RobotNumbers numbers;
   numbers.cables = recording.numbers(recording.count());
   numbers.rod = !numbers.cables.empty();
@@ -50,12 +56,17 @@ int replay(Recording& recording) {
     }
     const auto continuation = ccr::make_continuation<D>(robot, static_cast<int>(obstacles.size()));
     continuation->set_obstacles(obstacles);
-    std::vector<double> to(continuation->layout().size);
+    std::vector<double> to(continuation->layout().size),
+        rows((continuation->slope_row() + 1) * continuation->parameters());
     if (recording.count() != static_cast<int>(to.size())) std::exit(3);  // recorded of another robot
     for (int left = recording.count(); left > 0; --left, ++steps) {
       const std::vector<double> command = recording.numbers(continuation->layout().cables.size + 1),
                                 from = recording.numbers(to.size());
-      continuation->follow(from.data(), command.data(), to.data());
+      if (reads) continue;
+      const ccr::StepSlopes wanted{
+          .rows = differentiates ? rows.data() : nullptr, .in_length = in_all, .in_obstacles = in_all};
+      continuation->follow(from.data(), command.data(), to.data(), wanted);
+      if (slopes) continuation->slopes(to.data(), nullptr, true, rows.data());
     }
   }
   return steps;
@@ -63,7 +74,8 @@ int replay(Recording& recording) {
 
 }  // namespace
 
-int main(int, char** arguments) {
+int main(int count, char** arguments) {
   Recording recording(arguments[1]);
-  std::printf("%d\n", recording.count() == 2 ? replay<2>(recording) : replay<3>(recording));
+  const char* what = count > 2 ? arguments[2] : "step";
+  std::printf("%d\n", recording.count() == 2 ? replay<2>(recording, what) : replay<3>(recording, what));
 }

@@ -2,7 +2,7 @@
 
 from solver.cache.memo import TransitionMemo
 from solver.common.actuation import Actuation
-from solver.common.batch_slopes import CommandSlopes
+from solver.common.batch_slopes import CommandSlopes, StepSlopes
 from solver.common.equilibrium import Optimality, Residuals
 from solver.common.obstacle import Extent, Obstacle
 from solver.common.presets import PRESETS, Preset
@@ -58,6 +58,7 @@ __all__ = [
     "Sensitivity",
     "Solver",
     "Status",
+    "StepSlopes",
     "Trace",
     "TransitionMemo",
     "Transmission",

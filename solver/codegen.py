@@ -34,7 +34,8 @@ if __name__ == "__main__":
     kinds = (*planar.GAP_LAWS, *spatial.GAP_LAWS)
     generate("gap_laws", [function(law) for law in kinds for function in (gap_function, clearance_function)], folder)
     in_inputs = [
-        planar.segment_inputs_function(),
+        planar.segment_inputs_function("ccr_segment_pull", in_length=False),
+        planar.segment_inputs_function("ccr_segment_inputs", in_length=True),
         planar.disk_gap_length_function(),
         spatial.input_contraction_function(),
         arc.cable_length_function(),

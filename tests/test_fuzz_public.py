@@ -188,7 +188,7 @@ GOOD["ccr_gym.Scales.of"] = {"robot": ROBOT}
 # What holds results, has no arguments, is abstract or a protocol, or reads and writes files with checks of their own.
 UNCHECKED = {
     *("solver.Actuation", "solver.Extent", "solver.Motion", "solver.Optimality", "solver.Residuals", "solver.Rows"),
-    "solver.CommandSlopes",
+    *("solver.CommandSlopes", "solver.StepSlopes"),
     *("solver.RigidityFit", "solver.Sensitivity", "solver.Status", "solver.Trace", "solver.Transmission"),
     *("solver.Obstacle", "solver.held_signals", "solver.spatial.SpatialObstacle", "solver.spatial.SpatialSensitivity"),
     *("ccr_gym.ActionSpec", "ccr_gym.Assignment", "ccr_gym.PrivilegedState", "ccr_gym.Scales", "ccr_gym.Task"),

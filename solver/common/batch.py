@@ -8,12 +8,13 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
+from solver.common.batch_moves import MoveBatch, SlopeArrays
 from solver.common.checks import check_carried, check_clear, check_scene
 from solver.common.equilibrium import BaseEquilibrium, RobotT_co
 from solver.common.geometry import UnstressedRobot
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
-from solver.common.rows import Motion, RowBatch
+from solver.common.rows import RowBatch
 from solver.common.scene import MAX_OBSTACLES, Scene
 from solver.common.status import Status
 from solver.common.validation import (
@@ -27,10 +28,9 @@ from solver.common.validation import (
 EquilibriumT_co = TypeVar("EquilibriumT_co", bound=BaseEquilibrium[AnyRobot], covariant=True)
 
 MAX_PULL_STEPS = 100_000  # of a trial pull
-UNMOVED = -1.0  # in place of a part of the way
 
 
-class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
+class RobotBatch(MoveBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
     """Moves many robots at once, each with results bit-identical to those of its solver.
 
     Unlike a solver, a batch keeps the present equilibria, as rows of arrays that are written in place.
@@ -177,6 +177,15 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
                 repeated, a robot was not brought to rest in its scene, or obstacles cannot move to a scene; nothing
                 has moved then.
         """
+        self._step(cable_mm, robots, scenes)
+
+    def _step(
+        self,
+        cable_mm: np.ndarray,
+        robots: Sequence[int] | None,
+        scenes: Sequence[Scene] | None,
+        slopes: SlopeArrays | None = None,
+    ) -> None:
         indices = self._all if robots is None else self._check_indices(robots)
         shape = (len(indices),) if self.cables == 1 else (len(indices), self.cables)
         commands = check_array("cable_mm", cable_mm, shape, *self._cable_bounds(indices))
@@ -185,7 +194,7 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             self._check_rested(indices)
             self._check_lengths(indices)
             self.commands[indices, :-1] = commands.reshape(-1, self.cables)
-            self._move_among(indices, motions)
+            self._move_among(indices, motions, slopes)
 
     def move(self, robots: int | slice | list[int], scenes: Sequence[Scene] | None = None) -> None:
         """Move one robot, some or all to their :attr:`commands`, which must be in range.
@@ -198,16 +207,20 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             ValueError: If an index is out of range or repeated, a robot was not brought to rest in its scene, or
                 obstacles cannot move to a scene; nothing has moved then.
         """
+        self._move_to_commands(self._indices_of(robots), scenes)
+
+    def _indices_of(self, robots: int | slice | list[int]) -> list[int]:
         if isinstance(robots, slice):
-            indices = self._all[robots]
-        elif isinstance(robots, list):
-            indices = self._check_indices(robots)
-        else:
-            indices = [self._check_index(robots)]
+            return self._all[robots]
+        return self._check_indices(robots) if isinstance(robots, list) else [self._check_index(robots)]
+
+    def _move_to_commands(
+        self, indices: list[int], scenes: Sequence[Scene] | None, slopes: SlopeArrays | None = None
+    ) -> None:
         motions = self._motions(indices, scenes)
         with self._exclusive:
             self._check_rested(indices)
-            self._move_among(indices, motions)
+            self._move_among(indices, motions, slopes)
 
     def probe(self, commands: np.ndarray) -> np.ndarray:
         """Return the equilibria that all robots would move to, ``(N, size)``, without moving them.
@@ -322,28 +335,6 @@ class RobotBatch(RowBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
 
     def _rest(self, robots: list[int]) -> None:
         self._kernel_batch.rest(robots, self._lengths_mm(robots), self.blocks, *self._work)
-
-    def _move_among(self, robots: list[int], motions: list[Motion]) -> None:
-        """Move robots, some of them while their obstacles move."""
-        if not motions:
-            return self._move(robots)
-        moving = [motion.robot for motion in motions]
-        parts = np.full(len(motions), UNMOVED)
-        try:
-            self._move_into(moving, motions, parts)
-        finally:  # also of those that had moved when the call was interrupted
-            for motion, part in zip(motions, parts.tolist(), strict=True):
-                if part != UNMOVED:
-                    self._place(motion, part)
-        still = set(robots).difference(moving)
-        return self._move([robot for robot in robots if robot in still])
-
-    def _move_into(self, robots: list[int], motions: list[Motion], parts: np.ndarray) -> None:
-        kernel_motions = [(motion.obstacles, motion.bounds) for motion in motions]
-        self._kernel_batch.move(robots, kernel_motions, self.commands, self.blocks, parts, *self._work)
-
-    def _move(self, robots: list[int]) -> None:
-        self._kernel_batch.step(robots, self.commands, self.blocks, *self._work)
 
 
 BaseBatch = RobotBatch[AnyRobot, BaseEquilibrium[AnyRobot]]  # for code that serves both the plane and space

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -74,6 +75,40 @@ void each(Batch<D>& batch, const std::vector<int>& robots, Work work) {
   if (interruption.raised()) throw nb::python_error();
 }
 
+// Where the slopes of steps go, if they are asked for: a row for each cable, and where there is one more for the
+// length, of each robot that moves; and 1 for each whose slopes were found. The rows of the others are 0.
+template <int D>
+class SlopeTables {
+ public:
+  SlopeTables(const Batch<D>& batch, std::size_t robots, const std::optional<Output>& slopes,
+              const std::optional<Counts>& found) {
+    if (!slopes || !found) return;
+    const std::size_t rows = robots > 0 ? slopes->size() / (robots * (batch.slope_row() + 1)) : 0;
+    const std::size_t cables = batch.layout().cables.size;
+    size_ = rows * (batch.slope_row() + 1);
+    require(slopes->size() == robots * size_ && found->shape(0) == robots &&
+                (robots == 0 || rows == cables || rows == cables + 1),
+            "slopes must have a row for each cable, or for the length too, of each robot, and found a number");
+    to_ = slopes->data();
+    found_ = found->data();
+    in_length_ = rows > cables;
+  }
+
+  // Of a robot, by its index in the list.
+  StepSlopes of(int k) const { return {.rows = to_ ? to_ + size_ * k : nullptr, .in_length = in_length_}; }
+  void finish(int k, const StepResult& result) const {
+    if (!to_) return;
+    found_[k] = result.differentiated;
+    if (!result.differentiated) std::fill_n(to_ + size_ * k, size_, 0.0);
+  }
+
+ private:
+  double* to_ = nullptr;
+  std::int64_t* found_ = nullptr;
+  std::size_t size_ = 0;  // of the rows of a robot
+  bool in_length_ = false;
+};
+
 // A motion of the obstacles of one robot of a batch within its step.
 template <int D>
 using Motion = std::tuple<std::vector<Obstacle<D>>, std::vector<double>>;  // towards, and bounds
@@ -82,10 +117,11 @@ using Motion = std::tuple<std::vector<Obstacle<D>>, std::vector<double>>;  // to
 template <int D>
 void move(Batch<D>& batch, const std::vector<int>& robots, const std::vector<Motion<D>>& motions, const Table& commands,
           const Blocks& blocks, const Output& parts, const Counts& statuses, const Counts& iterations,
-          const Counts& factorizations) {
+          const Counts& factorizations, const std::optional<Output>& slopes, const std::optional<Counts>& found) {
   const typename Batch<D>::Lock lock(batch);
   const std::size_t cables = batch.layout().cables.size, size = batch.layout().size;
   require_tables(batch, robots, commands, blocks, statuses, iterations, factorizations);
+  const SlopeTables<D> tables(batch, robots.size(), slopes, found);
   require(motions.size() == robots.size() && parts.size() == robots.size(),
           "motions and parts must have an entry for each robot that moves");
   for (std::size_t k = 0; k < robots.size(); ++k) {
@@ -99,9 +135,10 @@ void move(Batch<D>& batch, const std::vector<int>& robots, const std::vector<Mot
   each(batch, robots, [&](Continuation<D>& continuation, int k) {
     const int i = robots[k];
     const auto& [towards, bounds] = motions[k];
-    const StepResult result =
-        continuation.move(block + size * i, command + (cables + 1) * i, towards, bounds, block + size * i);
+    const StepResult result = continuation.move(block + size * i, command + (cables + 1) * i, towards, bounds,
+                                                block + size * i, tables.of(k));
     if (result.interrupted) return;
+    tables.finish(k, result);
     part[k] = result.scene;
     status[i] = static_cast<int>(result.status);
     iterated[i] = result.iterations;
@@ -136,17 +173,21 @@ void set_robot(Batch<D>& batch, int index, const Robot* robot) {
 
 template <int D>
 void step(Batch<D>& batch, const std::vector<int>& robots, const Table& commands, const Blocks& blocks,
-          const Counts& statuses, const Counts& iterations, const Counts& factorizations) {
+          const Counts& statuses, const Counts& iterations, const Counts& factorizations,
+          const std::optional<Output>& slopes, const std::optional<Counts>& found) {
   const typename Batch<D>::Lock lock(batch);
   const std::size_t size = batch.layout().size, cables = batch.layout().cables.size;
   require_tables(batch, robots, commands, blocks, statuses, iterations, factorizations);
+  const SlopeTables<D> tables(batch, robots.size(), slopes, found);
   double* block = blocks.data();
   const double* command = commands.data();
   std::int64_t *status = statuses.data(), *iterated = iterations.data(), *factored = factorizations.data();
   each(batch, robots, [&](Continuation<D>& continuation, int k) {
     const int i = robots[k];
-    const StepResult result = continuation.follow(block + size * i, command + (cables + 1) * i, block + size * i);
+    const StepResult result =
+        continuation.follow(block + size * i, command + (cables + 1) * i, block + size * i, tables.of(k));
     if (result.interrupted) return;
+    tables.finish(k, result);
     status[i] = static_cast<int>(result.status);
     iterated[i] = result.iterations;
     factored[i] = result.factorizations;

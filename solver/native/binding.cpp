@@ -69,11 +69,15 @@ void bind_batch(nb::module_& m, const char* name) {
            "Bring some robots to rest, each at its length, in place.")
       .def(
           "move", &move<D>, "robots"_a, "motions"_a, "commands"_a, "blocks"_a, "parts"_a, "statuses"_a, "iterations"_a,
-          "factorizations"_a,
+          "factorizations"_a, "slopes"_a = nb::none(), "found"_a = nb::none(),
           "Move some robots to their commands while their obstacles move to others, in place. Each motion is where the "
           "obstacles go to, and bounds on how far their surfaces go.")
       .def("step", &step<D>, "robots"_a, "commands"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
-           "Move some robots to their commands, cables and length, in place.")
+           "slopes"_a = nb::none(), "found"_a = nb::none(),
+           "Move some robots to their commands, cables and length, in place. Write the slopes of these steps in their "
+           "commands, if there are arrays for them: for each cable, and where there is one more row for the length, "
+           "those "
+           "of `slopes` and that of the clearance.")
       .def("slopes", &slopes<D>, "robots"_a, "blocks"_a, "slopes"_a, "found"_a,
            "Write the slopes of the equilibria of some robots in their commands, cables and length, and whether they "
            "were "

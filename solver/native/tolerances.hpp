@@ -45,6 +45,8 @@ inline constexpr double kDependent =
 inline constexpr double kNearlyDependent = 1e-6;  // the same of one that may take the place of another
 inline constexpr double kToDifferentiate = 1e-8;  // the same below which rounding would spoil derivatives
 inline constexpr double kNoPart = 1e-18;          // share of a gap in a combination that is roundoff
+inline constexpr double kPressed = 10.0;  // share of a contact in the balance that is roundoff, over its tolerance
+inline constexpr double kAlong = 1e-9;    // motion of a gap or multiplier that is roundoff, over that of the cables
 
 // Convexification: a penalty on active gaps first, then damping of the unknowns, both relative to the largest
 // curvature.

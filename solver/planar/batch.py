@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver import _kernel
+from solver.common.batch_moves import SlopeArrays
 from solver.common.batch_slopes import SlopeBatch
 from solver.common.layout import Layout
 from solver.common.rows import Motion
@@ -57,12 +58,17 @@ class ReferenceBatch(BatchSolver):
         for robot in robots:
             self._keep(robot, self._reference(robot).rest())
 
-    def _move(self, robots: list[int]) -> None:
+    def _slope_arrays(self, count: int, rows: int) -> SlopeArrays:
+        raise ValueError("a ReferenceBatch has no derivatives of its steps; use a BatchSolver")
+
+    def _move(self, robots: list[int], slopes: SlopeArrays | None = None) -> None:
         for robot in robots:
             wanted = self.commands[robot, :-1].tolist()
             self._keep(robot, self._reference(robot).step(self._equilibrium(robot), wanted))
 
-    def _move_into(self, robots: list[int], motions: list[Motion], parts: np.ndarray) -> None:
+    def _move_into(
+        self, robots: list[int], motions: list[Motion], parts: np.ndarray, slopes: SlopeArrays | None = None
+    ) -> None:
         raise ValueError("obstacles of a ReferenceBatch do not move; use a BatchSolver")
 
     def _reference(self, robot: int) -> ReferenceSolver:

@@ -132,16 +132,32 @@ def segment_function() -> ca.Function:
     return ca.Function("ccr_segment", [sine, pull, length, offset], [law])
 
 
-def segment_inputs_function() -> ca.Function:
-    """Return the slopes of the segment law of the paper's model in its inputs.
+def segment_inputs_function(name: str, *, in_length: bool) -> ca.Function:
+    """Return the slopes of the segment law of the paper's model in its pull, or also in its length.
 
-    ``(σ, pull, l0, a) → θ_pull, θ_l0, θ_σpull, θ_σl0, θ_pullpull, θ_pulll0, θ_l0l0``.
+    ``(σ, pull, l0, a) → θ_pull, θ_σpull, θ_pullpull``, or ``→ θ_pull, θ_l0, θ_σpull, θ_σl0, θ_pullpull, θ_pulll0,
+    θ_l0l0``, by the implicit function theorem as in :func:`segment_function`.
     """
-    sine, pull, length, offset = symbols = [ca.SX.sym(name) for name in ("sine", "pull", "length", "offset")]
-    inputs, angle = ca.vertcat(pull, length), 2 * ca.asin(segment_half_sine(sine, pull, length, offset))
-    hessian, slopes = ca.hessian(angle, inputs)
-    law = ca.vertcat(slopes, ca.gradient(ca.gradient(angle, sine), inputs), hessian[0, 0], hessian[1, 0], hessian[1, 1])
-    return ca.Function("ccr_segment_inputs", symbols, [ca.cse(ca.densify(law))])
+    sine, pull, length, offset, u = (ca.SX.sym(name) for name in ("sine", "pull", "length", "offset", "half_sine"))
+    closure = segment_closure(u, sine, pull, length, offset)
+    in_u, half_cosine = ca.gradient(closure, u), ca.sqrt(1 - u**2)
+    per_both = 1 / (in_u * half_cosine)
+    per_closure, per_half_cosine = -per_both * half_cosine, per_both * in_u
+
+    def first(of: ca.SX) -> ca.SX:
+        return ca.gradient(closure, of) * per_closure
+
+    def second(one: ca.SX, other: ca.SX) -> ca.SX:
+        mixed = ca.gradient(ca.gradient(closure, one), other) + ca.gradient(in_u, u) * first(one) * first(other)
+        mixed += ca.gradient(in_u, one) * first(other) + ca.gradient(in_u, other) * first(one)
+        return 2 * per_half_cosine * (mixed * per_closure + u * per_half_cosine**2 * first(one) * first(other))
+
+    inputs = [pull, length] if in_length else [pull]
+    slopes = [2 * per_half_cosine * first(one) for one in inputs] + [second(sine, one) for one in inputs]
+    curvatures = [second(one, other) for k, one in enumerate(inputs) for other in inputs[k:]]
+    half_sine = segment_half_sine(sine, pull, length, offset)
+    law = ca.cse(ca.substitute(ca.vertcat(*slopes, *curvatures), u, half_sine))
+    return ca.Function(name, [sine, pull, length, offset], [law])
 
 
 def arc_function() -> ca.Function:

@@ -30,11 +30,13 @@ namespace {
 template <int D>
 class Pulled {
  public:
-  Pulled(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles)
+  Pulled(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles, bool differentiates = false)
       : of_(of),
+        differentiates_(differentiates),
         obstacles_(obstacles),
         continuation_(make_continuation<D>(make_robot<D>(of), static_cast<int>(obstacles.size()))) {
     continuation_->set_obstacles(obstacles_);
+    rows_.resize((continuation_->layout().cables.size + 1) * (continuation_->slope_row() + 1));
     now_ = to_ = rest_block(*continuation_, of.length);
     rest_ = now_;
   }
@@ -48,7 +50,8 @@ class Pulled {
       if (D == 3) command[1] = second * command[0];
       command[D - 1] = of_.length;
       const long before = allocations;
-      const Status status = continuation_->follow(now_.data(), command.data(), to_.data()).status;
+      const StepSlopes slopes{.rows = differentiates_ ? rows_.data() : nullptr, .in_length = true};
+      const Status status = continuation_->follow(now_.data(), command.data(), to_.data(), slopes).status;
       allocated += allocations - before;
       ++met[static_cast<int>(status)];
       std::swap(now_, to_);
@@ -68,15 +71,17 @@ class Pulled {
 
  private:
   RobotNumbers of_;
+  bool differentiates_;
   std::vector<Obstacle<D>> obstacles_;
   std::unique_ptr<Continuation<D>> continuation_;
-  std::vector<double> rest_, now_, to_;
+  std::vector<double> rest_, now_, to_, rows_;
 };
 
 // Pulls there and back twice, the first time to warm up; returns the counts of the second.
 template <int D>
-Pulled<D> twice(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles, double to) {
-  Pulled<D> pulled(of, obstacles);
+Pulled<D> twice(const RobotNumbers& of, const std::vector<Obstacle<D>>& obstacles, double to,
+                bool differentiates = false) {
+  Pulled<D> pulled(of, obstacles, differentiates);
   for (int round = 0; round < 2; ++round) {
     pulled.begin();
     pulled.pull(to, 40);
@@ -111,6 +116,21 @@ TEST_CASE("steps in contact allocate nothing, stalls included") {
     }
     const Robot robot = make_robot<3>(prototype());
     const auto pulled = twice<3>(prototype(), {sphere(robot, 40, 18, 104, 15, spring)}, 8);
+    CHECK(pulled.allocated == 0);
+    CHECK(pulled.touched > 20);
+  }
+}
+
+TEST_CASE("steps with their slopes allocate nothing") {
+  for (const double spring : {0.0, 0.05}) {
+    for (const bool rod : {false, true}) {
+      const Robot robot = make_robot<2>(prototype(rod));
+      const auto pulled = twice<2>(prototype(rod), {circle(robot, 44, 104, 15, spring)}, 12, true);
+      CHECK(pulled.allocated == 0);
+      CHECK(pulled.touched > 20);
+    }
+    const Robot robot = make_robot<3>(prototype());
+    const auto pulled = twice<3>(prototype(), {sphere(robot, 40, 18, 104, 15, spring)}, 8, true);
     CHECK(pulled.allocated == 0);
     CHECK(pulled.touched > 20);
   }

@@ -66,6 +66,9 @@ class Riccati {
     return negative;
   }
 
+  // The stage from which on nothing acts on a state: H is that of the controls alone there. Follows a factor.
+  int idle() const { return idle_; }
+
   // A linear term in the state of a node, and in that of the next one where `split`.
   struct Force {
     int node;

@@ -16,6 +16,14 @@ PaperInputs paper_inputs(double sine, double pull, double length, double offset)
   return slopes;
 }
 
+PaperPull paper_pull(double sine, double pull, double length, double offset) {
+  PaperPull slopes;
+  const double* in[] = {&sine, &pull, &length, &offset};
+  double* out[] = {&slopes.angle};
+  ccr_segment_pull(in, out, nullptr, nullptr, 0);
+  return slopes;
+}
+
 SpatialInputs spatial_inputs(const SegmentInputs& inputs, const double* control, const double* bending,
                              const Vec<3>& force, const Vec<3>& moment) {
   SpatialInputs slopes;

@@ -35,6 +35,11 @@ struct PaperInputs {
   double pull_curvature, coupling, length_curvature;  // of θ: second derivatives in both
 };
 PaperInputs paper_inputs(double sine, double pull, double length, double offset);
+// The same in the pull alone.
+struct PaperPull {
+  double angle, slope, curvature;
+};
+PaperPull paper_pull(double sine, double pull, double length, double offset);
 
 // Slopes of the law of a segment in space in both pulls and the length; see `ccr_input_contraction`.
 struct SpatialInputs {

@@ -94,8 +94,9 @@ class Planar {
   // Slope of the gap in the length of the robot, and that one's in the control.
   LengthSlope<Control> disk_length_slope(int segment, int side) const requires(kRod);
 
-  // Slopes in the inputs of the segment law; follows lagrangian_hessian.
-  void input_slopes(const Command& command, const std::vector<Control>& controls, InputSlopes<Planar>& slopes) const;
+  // Slopes in the first inputs of the segment law; follows lagrangian_hessian.
+  void input_slopes(const Command& command, const std::vector<Control>& controls, int inputs,
+                    InputSlopes<Planar>& slopes) const;
 
   // Sine of the shear angle at which a segment folds over.
   double widest_shear() const { return kRod ? HUGE_VAL : 1 - displacement_ / length_; }
@@ -110,6 +111,9 @@ class Planar {
   double widest = 0;               // largest angle between consecutive disks
 
  private:
+  void slope_arcs(InputSlopes<Planar>& to) const requires(kRod);
+  void slope_in_pull(const std::vector<Control>& controls, InputSlopes<Planar>& to) const requires(!kRod);
+  void slope_in_both(const std::vector<Control>& controls, InputSlopes<Planar>& to) const requires(!kRod);
   double slack_curvature(int segment) const;  // of the slacks with their multipliers, in the control
 
   Robot robot_;

@@ -49,8 +49,8 @@ class SpatialPaper {
   bool has_free_form() const { return true; }
   Vec<kTip> free_slopes(const Command& command) const;
 
-  // Slopes in the inputs of the segment law; follows lagrangian_hessian.
-  void input_slopes(const Command& command, const std::vector<Control>& controls,
+  // Slopes in the first inputs of the segment law; follows lagrangian_hessian.
+  void input_slopes(const Command& command, const std::vector<Control>& controls, int inputs,
                     InputSlopes<SpatialPaper>& slopes) const;
 
   // Sine of the shear angle at which a segment folds over.

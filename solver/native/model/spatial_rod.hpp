@@ -66,8 +66,8 @@ class SpatialRod {
   // Slope of the gap in the length of the robot, and that one's in the control.
   LengthSlope<Control> disk_length_slope(int segment, int side) const;
 
-  // Slopes in the inputs of the segment law; follows lagrangian_hessian.
-  void input_slopes(const Command& command, const std::vector<Control>& controls,
+  // Slopes in the first inputs of the segment law; follows lagrangian_hessian.
+  void input_slopes(const Command& command, const std::vector<Control>& controls, int inputs,
                     InputSlopes<SpatialRod>& slopes) const;
 
   double widest_shear() const { return HUGE_VAL; }

@@ -193,10 +193,11 @@ class ContactProblem {
   // Adds the change of -λ∇c in the lower state beside a point between nodes, where the upper state moves by itself.
   void add_coupling(int contact, double multiplier, std::vector<InputSlope<Model>>& segments) const;
   GapRate<kSpace> gap_rate(int contact, int motion, const Gap<kSpace>& gap) const;
-  // Adds the slope of the loads in the length to that of the Lagrangian in the states of the nodes.
-  void add_load_growth(std::vector<State>& node_slopes) const;
-  void input_slopes(const Iterate& at, InputSlopes<Model>& slopes) const {
-    model_.input_slopes(at.command, at.controls, slopes);
+  // Adds the slope of the loads in the length to that of the Lagrangian in the states of the nodes; `forces` is
+  // scratch.
+  void add_load_growth(std::vector<State>& node_slopes, std::vector<State>& forces) const;
+  void input_slopes(const Iterate& at, int inputs, InputSlopes<Model>& slopes) const {
+    model_.input_slopes(at.command, at.controls, inputs, slopes);
   }
   int disk_segment(int contact) const { return (contact - first_disk_contact()) / std::max(1, Model::kDiskSides); }
   LengthSlope<Control> disk_length_slope(int contact) const requires(Model::kRod) {

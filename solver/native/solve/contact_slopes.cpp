@@ -69,11 +69,11 @@ GapRate<ContactProblem<Model>::kSpace> ContactProblem<Model>::gap_rate(int conta
 
 // Over the energy scale, which falls with the length, a load grows with it, and the weight of a segment once more.
 template <class Model>
-void ContactProblem<Model>::add_load_growth(std::vector<State>& node_slopes) const {
+void ContactProblem<Model>::add_load_growth(std::vector<State>& node_slopes, std::vector<State>& forces) const {
   if constexpr (Model::kRod) {
     const int n = robot_.segments;
     const double length = n * model_.segment_length(), scale = loaded_ / energy_scale();
-    std::vector<State> forces(node_slopes.size());
+    forces.assign(node_slopes.size(), {});
     add_loads(forces);
     for (int i = 1; i <= n; ++i) {
       for (int k = 0; k < kState; ++k) node_slopes[i][k] -= forces[i][k] / length;
@@ -86,7 +86,7 @@ void ContactProblem<Model>::add_load_growth(std::vector<State>& node_slopes) con
   template ContactProblem<Model>::Position ContactProblem<Model>::velocity(int, const std::vector<State>&) const;      \
   template void ContactProblem<Model>::add_coupling(int, double, std::vector<InputSlope<Model>>&) const;               \
   template GapRate<ContactProblem<Model>::kSpace> ContactProblem<Model>::gap_rate(int, int, const Gap<kSpace>&) const; \
-  template void ContactProblem<Model>::add_load_growth(std::vector<State>&) const;
+  template void ContactProblem<Model>::add_load_growth(std::vector<State>&, std::vector<State>&) const;
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE
 

@@ -28,6 +28,14 @@ struct SlopeResult {
   int left_out = 0;
 };
 
+// Where the slopes of a step go: a row for each cable, with `in_length` for the length, and with `in_obstacles` for
+// each motion of each obstacle, as those of `slopes`. Each is `slope_row` numbers and the slope of the clearance. None
+// are written where `rows` is null, or none are found.
+struct StepSlopes {
+  double* rows = nullptr;
+  bool in_length = false, in_obstacles = false;
+};
+
 // The continuation of one robot in the plane or in space, for scenes of a fixed number of obstacles. Holds scratch
 // memory and no state between calls: an equilibrium is a block of numbers, laid out as `layout` says.
 template <int D>
@@ -56,12 +64,16 @@ class Continuation {
 
   // Takes the robot from the equilibrium in one block towards the command `target`, cables and length evenly, and
   // writes the equilibrium reached to another block, which may be the same. Writes nothing where it is interrupted.
-  virtual StepResult follow(const double* from, const double* target, double* to) = 0;
+  // Slopes are found of a step that converged, on the side to which its cables moved: where a gap is closed and not
+  // pressed, or pressed by nothing but roundoff, it stays closed if it would be pressed farther that way, and opens
+  // otherwise. A cable at its least displacement counts as pulled. A cable that could not be released because the robot
+  // of the paper's models touches does not follow its command, and has no slopes but zeros.
+  virtual StepResult follow(const double* from, const double* target, double* to, const StepSlopes& slopes = {}) = 0;
 
   // The same while the obstacles move evenly to others of the same kinds, as far as they can; `result.scene` says how
   // far. `motions` bounds the motion of the surface of each [mm]. Ends among the obstacles of `set_obstacles`.
   virtual StepResult move(const double* from, const double* target, std::span<const Obstacle<D>> towards,
-                          std::span<const double> motions, double* to) = 0;
+                          std::span<const double> motions, double* to, const StepSlopes& slopes = {}) = 0;
 
   // The same as `follow`, appending every accepted shape to `shapes`: three numbers of each node, the points that can
   // touch, and the displacements of the obstacles.

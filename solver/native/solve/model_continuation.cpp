@@ -265,7 +265,8 @@ bool ModelContinuation<Model>::refine(Pursuit& pursuit, double size, bool blocke
 }
 
 template <class Model>
-StepResult ModelContinuation<Model>::follow(const double* from, const double* target, double* to) {
+StepResult ModelContinuation<Model>::follow(const double* from, const double* target, double* to,
+                                            const StepSlopes& slopes) {
   result_ = {};
   factorizations_before_ = newton_.factorizations();
   was_exceeded_ = false;
@@ -285,6 +286,7 @@ StepResult ModelContinuation<Model>::follow(const double* from, const double* ta
     result_.scene = start.scene;
     if (to != from) std::copy_n(from, layout_.size, to);
   }
+  if (slopes.rows) result_.differentiated = differentiate_step(start, wanted, to, slopes);
   return result_;
 }
 
@@ -320,17 +322,17 @@ template <class Model>
 StepResult ModelContinuation<Model>::trace(const double* from, const double* target, double* to,
                                            std::vector<double>& shapes) {
   shapes_ = &shapes;
-  const StepResult result = follow(from, target, to);
+  const StepResult result = follow(from, target, to, {});
   shapes_ = nullptr;
   return result;
 }
 
-#define CCR_INSTANTIATE(Model)                                                                 \
-  template ModelContinuation<Model>::ModelContinuation(const Robot&, int);                     \
-  template Status ModelContinuation<Model>::pursue(const Command&);                            \
-  template StepResult ModelContinuation<Model>::follow(const double*, const double*, double*); \
-  template void ModelContinuation<Model>::evaluate_present();                                  \
-  template StepResult ModelContinuation<Model>::finish(const Command&, double*);               \
+#define CCR_INSTANTIATE(Model)                                                                                    \
+  template ModelContinuation<Model>::ModelContinuation(const Robot&, int);                                        \
+  template Status ModelContinuation<Model>::pursue(const Command&);                                               \
+  template StepResult ModelContinuation<Model>::follow(const double*, const double*, double*, const StepSlopes&); \
+  template void ModelContinuation<Model>::evaluate_present();                                                     \
+  template StepResult ModelContinuation<Model>::finish(const Command&, double*);                                  \
   template void ModelContinuation<Model>::accept();
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

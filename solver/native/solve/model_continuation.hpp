@@ -49,9 +49,9 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   void set_obstacles(std::span<const Obstacle<kSpace>> obstacles) override;
   void set_interruption(Interruption interruption) override { interruption_ = std::move(interruption); }
   StepResult rest(double length, double* to) override;
-  StepResult follow(const double* from, const double* target, double* to) override;
+  StepResult follow(const double* from, const double* target, double* to, const StepSlopes& slopes) override;
   StepResult move(const double* from, const double* target, std::span<const Obstacle<kSpace>> towards,
-                  std::span<const double> motions, double* to) override;
+                  std::span<const double> motions, double* to, const StepSlopes& slopes) override;
   StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) override;
   bool ramp_reaches_force(const Ramp& ramp, double* reached) override;
   Optimality optimality(const double* block) override;
@@ -206,7 +206,13 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   double energy_below(const Command& ceiling) const;
   bool trial_is_close() const;
 
+  // Slopes in the parameters.
+  Slopes<Model>& prepare_slopes();
   bool find_held(const bool* held, ActiveSet& gaps) const;
+  bool differentiate_step(const Command& start, const Command& target, const double* block, const StepSlopes& to);
+  bool differentiate_towards(const Tensions& motion, const SlopeRequest& request, double* rows);
+  void find_loose(ActiveSet& held, ActiveSet& loose) const;
+  int misjudged(const ActiveSet& held, const ActiveSet& loose, const Tensions& motion) const;
 
   BlockLayout layout_;
   Newton<Model> newton_;
@@ -252,7 +258,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   bool motors_yield_ = false;  // whether those that would have to hold more than the limit let their cables out on it
   Tensions descent_kept_{};    // tensions that motors kept there
   int last_yielded_ = -1;      // the cable that a motor let out last on it
-  std::unique_ptr<Slopes<Model>> slopes_;  // made when slopes are asked for
+  std::vector<std::unique_ptr<Slopes<Model>>> slopes_;  // for each number of mounts, made when slopes are asked for
 };
 
 // The largest of some numbers.

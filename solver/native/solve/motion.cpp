@@ -66,11 +66,11 @@ ContactProblem<Model>::Position ContactProblem<Model>::displacement(int obstacle
 template <class Model>
 StepResult ModelContinuation<Model>::move(const double* from, const double* target,
                                           std::span<const Obstacle<kSpace>> towards, std::span<const double> motions,
-                                          double* to) {
+                                          double* to, const StepSlopes& slopes) {
   const auto origins = problem_.obstacles();
   if (std::any_of(motions.begin(), motions.end(), [](double moved) { return moved > 0; }))
     problem_.move_obstacles(towards, motions);
-  StepResult result = follow(from, target, to);
+  StepResult result = follow(from, target, to, slopes);
   if (result.scene < 1) result.status = std::max(result.status, Status::kBlocked);
   set_obstacles(origins);
   return result;
@@ -129,7 +129,7 @@ bool ModelContinuation<Model>::pushes(const Tensions& tensions) const {
   template void ContactProblem<Model>::place_obstacles(double);                                                       \
   template ContactProblem<Model>::Position ContactProblem<Model>::displacement(int, double, double) const;            \
   template StepResult ModelContinuation<Model>::move(const double*, const double*, std::span<const Obstacle<kSpace>>, \
-                                                     std::span<const double>, double*);                               \
+                                                     std::span<const double>, double*, const StepSlopes&);            \
   template void ModelContinuation<Model>::share_motion(Command&, bool) const;                                         \
   template bool ModelContinuation<Model>::pushes(const Tensions&) const;                                              \
   template bool ModelContinuation<Model>::pay_out(const Command&);

@@ -18,32 +18,53 @@ Slopes<Model>::Slopes(int segments, int mounts)
   }
 }
 
+// Factors the KKT system of an equilibrium and of the gaps that stay closed; false where it is singular. A robot of the
+// paper's models that nothing touches needs none: it does not shear, whatever its cables and its length are.
 template <class Model>
-int Slopes<Model>::differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held,
-                                 bool in_obstacles, double* rows) {
+bool Slopes<Model>::factor(const ContactProblem& problem, const Iterate& at, const ActiveSet& held) {
   kkt_.assemble(problem, at.active, 0);
-  if (!kkt_.factor(0)) return -1;
-  const int cables = Model::kRod ? static_cast<int>(problem.robot().rod.cables.size()) : kCables;
   held_ = held;
+  still_ = !Model::kRod && at.active.count + held.count == 0 &&
+           std::all_of(at.controls.begin(), at.controls.end(), [](const Control& u) { return u.v == Control{}.v; });
+  reach_ = 0;
+  if (still_) return true;
+  if (!kkt_.factor(0)) return false;
+  reach_ = problem.has_loads() ? segments_ : kkt_.system().idle();
+  if (held.count == 0) return true;
   const auto cables_held = [&](const ActiveSet& gaps) {
     const auto begin = gaps.contact.begin();
     return std::count_if(begin, begin + gaps.count, [&](int contact) { return problem.is_slack(contact); });
   };
-  if (qp_.hold(problem, kkt_, held_) < tolerances::kToDifferentiate) return -1;
-  if (cables_held(held_) < cables_held(held)) return -1;  // taut cables that lock the robot cannot be moved alone
+  if (qp_.hold(problem, kkt_, held_) < tolerances::kToDifferentiate) return false;
+  return cables_held(held_) == cables_held(held);  // taut cables that lock the robot cannot be moved alone
+}
+
+template <class Model>
+int Slopes<Model>::differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held,
+                                 const SlopeRequest& request, double* rows) {
+  if (!factor(problem, at, held)) return -1;
+  const int cables = cables_ = Model::kRod ? static_cast<int>(problem.robot().rod.cables.size()) : kCables;
   find_touches(problem, at);
-  problem.input_slopes(at, laws_);
-  for (int k = 0; k < kInputs; ++k) find_input(problem, at, k);
+  asked_ = request.length ? kInputs : kInputs - 1;
+  if (asked_ > 0) problem.input_slopes(at, asked_, laws_);
+  for (int k = 0; k < asked_; ++k) find_input(problem, at, k);
   if constexpr (!Model::kRod) find_within();
   used_ = 0;
   add_cable_rows(problem.contacts(), cables);
-  const int obstacles = static_cast<int>(problem.obstacles().size()), moving = in_obstacles ? obstacles : 0;
+  if (request.length) add_input_row(cables, kInputs - 1);
+  const int obstacles = static_cast<int>(problem.obstacles().size()), moving = request.obstacles ? obstacles : 0;
   for (int j = 0; j < moving; ++j)
-    for (int motion = 0; motion < kMotions; ++motion) add_obstacle_row(problem, j, motion, cables + 1);
+    for (int motion = 0; motion < kMotions; ++motion) add_obstacle_row(problem, j, motion, cables + request.length);
   respond();
   const SlopeRow<Model> fields(segments_, problem.contacts(), cables, obstacles);
-  std::fill_n(rows, (cables + 1 + kMotions * moving) * fields.size(), 0.0);
-  for (int k = 0; k < used_; ++k) finish(problem, at, rows_[k], rows + rows_[k].parameter * fields.size());
+  const int size = fields.size() + request.gap;
+  std::fill_n(rows, (cables + request.length + kMotions * moving) * size, 0.0);
+  for (int k = 0; k < used_; ++k) {
+    double* to = rows + rows_[k].parameter * size;
+    finish(problem, at, rows_[k], to);
+    if (request.contact >= 0) to[fields.size()] = gap_slope(problem, request.contact, rows_[k]);
+  }
+  if (moving > 0 && request.contact >= 0) add_own_motion(problem, request.contact, rows + size - 1, size);
   return held.count - held_.count;
 }
 
@@ -71,13 +92,13 @@ void Slopes<Model>::find_input(const ContactProblem& problem, const Iterate& at,
   for (const Touch& touch : touches_)
     if (touch.multiplier != 0) problem.add_coupling(touch.contact, touch.multiplier, laws_.segment[number]);
   move_nodes(laws_.segment[number], input);
-  if (Model::kRod && problem.has_loads()) problem.add_load_growth(input.node_slopes);
+  if (Model::kRod && problem.has_loads()) problem.add_load_growth(input.node_slopes, load_forces_);
   pull_back(laws_.segment[number], input);
   for (int m = 0; m < mounts_; ++m) {
     input.mounts[m] = is_length ? times(problem.spring(m), at.mounts[m]) : Position{};
     for (double& slope : input.mounts[m].v) slope /= at.command.length;
   }
-  input.gaps.fill(0);
+  std::fill_n(input.gaps.begin(), held_.count, 0.0);
   for (const Touch& touch : touches_) {
     const Position velocity = problem.velocity(touch.contact, input.moved);
     if (touch.mount >= 0) input.mounts[touch.mount] += times(touch.gap.curvature(touch.multiplier), velocity);
@@ -93,6 +114,8 @@ void Slopes<Model>::move_nodes(const std::vector<InputSlope<Model>>& laws, Input
   for (int i = 0; i < segments_; ++i) {
     input.moved[i + 1] = times(system.stages[i].a, input.moved[i]);
     input.moved[i + 1] += laws[i].upper;
+  }
+  for (int i = 0; i < reach_; ++i) {
     input.node_slopes[i + 1] = times(system.node_hessian[i + 1], input.moved[i + 1]);
     if (i + 1 < segments_) input.node_slopes[i + 1] += laws[i + 1].lower;
   }
@@ -102,7 +125,8 @@ void Slopes<Model>::move_nodes(const std::vector<InputSlope<Model>>& laws, Input
 template <class Model>
 void Slopes<Model>::pull_back(const std::vector<InputSlope<Model>>& laws, Input& input) const {
   State force;
-  for (int i = segments_ - 1; i >= 0; --i) {
+  for (int i = segments_ - 1; i >= reach_; --i) input.gradient[i] = laws[i].own;
+  for (int i = reach_ - 1; i >= 0; --i) {
     const auto& stage = kkt_.system().stages[i];
     force += input.node_slopes[i + 1];
     input.gradient[i] = laws[i].own;
@@ -134,9 +158,9 @@ void Slopes<Model>::add_own_gaps(const ContactProblem& problem, const ActiveSet&
 template <class Model>
 void Slopes<Model>::find_within() {
   within_ = laws_.curvature;
-  for (int r = 0; r < kInputs; ++r)
-    for (int c = 0; c < kInputs; ++c)
-      for (int i = 1; i <= segments_; ++i) {
+  for (int r = 0; r < asked_; ++r)
+    for (int c = 0; c < asked_; ++c)
+      for (int i = 1; i <= reach_; ++i) {
         within_(r, c) += dot(inputs_[r].node_slopes[i], inputs_[c].moved[i]);
         if (i < segments_) within_(r, c) += dot(laws_.segment[c][i].lower, inputs_[r].moved[i]);
       }
@@ -152,25 +176,34 @@ Slopes<Model>::Row& Slopes<Model>::add_row(int parameter, int input, int obstacl
   row.tensions = {};
   row.gaps.assign(touches_.size(), {});
   row.forces.clear();
-  row.response.clear();
-  row.changes.fill(0);
+  std::fill(row.response.mounts.begin(), row.response.mounts.end(), Position{});
+  std::fill_n(row.changes.begin(), held_.count, 0.0);
+  if (still_) row.response.clear();
   return row;
 }
 
 // A taut cable of a rod changes its own slack and nothing else; a slack one does nothing.
 template <class Model>
 void Slopes<Model>::add_cable_rows(int contacts, int cables) {
-  if constexpr (Model::kRod)
+  if constexpr (Model::kRod) {
     for (int j = 0; j < held_.count; ++j)
-      if (const int cable = held_.contact[j] - contacts; cable >= 0 && cable < cables)
-        add_row(cable, -1, -1).changes[j] = -1;
-  for (int k = 0; k < kInputs; ++k) {
-    Row& row = add_row(Model::kRod ? cables : k, k, -1);
-    row.changes = inputs_[k].gaps;
-    for (int m = 0; m < mounts_; ++m) row.response.mounts[m] -= inputs_[k].mounts[m];
-    if constexpr (!Model::kRod)
-      for (int c = 0; c < kCables; ++c) row.tensions[c] = within_(c, k);
+      if (const int cable = held_.contact[j] - contacts; cable >= 0 && cable < cables) {
+        Row& row = add_row(cable, -1, -1);
+        row.changes[j] = -1;
+        row.response.clear();
+      }
+  } else {
+    for (int k = 0; k < cables; ++k) add_input_row(k, k);
   }
+}
+
+template <class Model>
+void Slopes<Model>::add_input_row(int parameter, int input) {
+  Row& row = add_row(parameter, input, -1);
+  std::copy_n(inputs_[input].gaps.begin(), held_.count, row.changes.begin());
+  for (int m = 0; m < mounts_; ++m) row.response.mounts[m] -= inputs_[input].mounts[m];
+  if constexpr (!Model::kRod)
+    for (int c = 0; c < kCables; ++c) row.tensions[c] = within_(c, input);
 }
 
 template <class Model>
@@ -196,6 +229,7 @@ void Slopes<Model>::add_obstacle_row(const ContactProblem& problem, int obstacle
 template <class Model>
 void Slopes<Model>::respond() {
   forcings_.clear();
+  if (still_) return;
   for (int k = 0; k < used_; ++k) {
     Row& row = rows_[k];
     if (row.input >= 0)
@@ -212,6 +246,7 @@ template <class Model>
 double Slopes<Model>::tension_slope(const Row& row, int cable) const {
   const Input& input = inputs_[cable];
   double slope = row.tensions[cable];
+  if (still_) return slope;
   for (int i = 0; i < segments_; ++i) slope += dot(input.gradient[i], row.response.controls[i]);
   for (int m = 0; m < mounts_; ++m) slope += dot(input.mounts[m], row.response.mounts[m]);
   for (int j = 0; j < held_.count; ++j) slope -= input.gaps[j] * row.changes[j];
@@ -221,9 +256,8 @@ double Slopes<Model>::tension_slope(const Row& row, int cable) const {
 template <class Model>
 void Slopes<Model>::finish(const ContactProblem& problem, const Iterate& at, Row& row, double* to) const {
   const bool is_length = row.input == kInputs - 1;
-  const int cables = Model::kRod ? static_cast<int>(problem.robot().rod.cables.size()) : kCables;
   const int obstacles = static_cast<int>(problem.obstacles().size());
-  const SlopeRow<Model> fields(segments_, problem.contacts(), cables, obstacles);
+  const SlopeRow<Model> fields(segments_, problem.contacts(), cables_, obstacles);
   double* multipliers = to + fields.nodes + fields.turns;
   double* tensions = multipliers + fields.contacts;
   const double scale = problem.energy_scale();
@@ -233,10 +267,10 @@ void Slopes<Model>::finish(const ContactProblem& problem, const Iterate& at, Row
     if (Model::kRod && problem.is_slack(contact)) tensions[contact - problem.contacts()] = scale * row.changes[j];
   }
   if constexpr (!Model::kRod)
-    for (int k = 0; k < cables; ++k) tensions[k] = (at.command.cables[k] < 0 ? -scale : scale) * tension_slope(row, k);
+    for (int k = 0; k < cables_; ++k) tensions[k] = (at.command.cables[k] < 0 ? -scale : scale) * tension_slope(row, k);
   if (is_length) {  // the energy scale falls as the length grows
     const auto now = problem.tensions(at.active);
-    for (int k = 0; k < cables; ++k) tensions[k] -= now[k] / at.command.length;
+    for (int k = 0; k < cables_; ++k) tensions[k] -= now[k] / at.command.length;
   }
   if (row.input >= 0)
     for (int i = 1; i <= segments_; ++i) row.response.states[i] += inputs_[row.input].moved[i];
@@ -255,6 +289,42 @@ void Slopes<Model>::finish(const ContactProblem& problem, const Iterate& at, Row
   for (int j = 0; j < obstacles; ++j)
     if (const int mount = problem.mount_of(j); mount >= 0)
       std::copy_n(row.response.mounts[mount].v.begin(), kSpace, forces + fields.forces + kSpace * j);
+}
+
+// Slope of the gap of a contact, 0 where it is held.
+template <class Model>
+double Slopes<Model>::gap_slope(const ContactProblem& problem, int contact, const Row& row) const {
+  if (std::count(held_.contact.begin(), held_.contact.begin() + held_.count, contact) > 0) return 0;
+  return problem.slope(contact).along(row.response);
+}
+
+// Adds how the gap of a contact that is not held changes while its obstacle moves and the robot does not.
+template <class Model>
+void Slopes<Model>::add_own_motion(const ContactProblem& problem, int contact, double* slopes, int size) const {
+  if (std::count(held_.contact.begin(), held_.contact.begin() + held_.count, contact) > 0) return;
+  const int first = cables_ + (asked_ == kInputs) + kMotions * (contact / problem.robot().points());
+  const Gap<kSpace> gap = problem.gap(contact);
+  for (int motion = 0; motion < kMotions; ++motion)
+    slopes[(first + motion) * size] += problem.gap_rate(contact, motion, gap).value;
+}
+
+template <class Model>
+double Slopes<Model>::multiplier_along(int contact, const Vec<Model::kCables>& motion) const {
+  double slope = 0;
+  for (int j = 0; j < held_.count; ++j)
+    for (int k = 0; k < used_; ++k)
+      if (held_.contact[j] == contact && rows_[k].parameter < cables_)
+        slope += motion[rows_[k].parameter] * rows_[k].changes[j];
+  return slope;
+}
+
+// The slack of a cable falls with its own displacement.
+template <class Model>
+double Slopes<Model>::gap_along(const ContactProblem& problem, int contact, const Vec<Model::kCables>& motion) const {
+  double slope = problem.is_slack(contact) ? -motion[contact - problem.contacts()] : 0;
+  for (int k = 0; k < used_; ++k)
+    if (rows_[k].parameter < cables_) slope += motion[rows_[k].parameter] * gap_slope(problem, contact, rows_[k]);
+  return slope;
 }
 
 template <class Model>

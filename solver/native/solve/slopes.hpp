@@ -26,6 +26,14 @@ struct SlopeRow {
   int nodes, turns, contacts, cables, forces;
 };
 
+// What an equilibrium is differentiated in beside its cables, and whether the slope of the gap of a contact, or of
+// none, ends each row.
+struct SlopeRequest {
+  bool length = true, obstacles = false;
+  bool gap = false;
+  int contact = -1;
+};
+
 // The parameters are the displacement of each cable, the length, and of each obstacle its motions: shifts, turns about
 // its centre, growth. The Hessian has no penalty and no damping; its eigenvalues may have any sign.
 template <class Model>
@@ -36,14 +44,17 @@ class Slopes {
   static constexpr int kMotions = ContactProblem::kMotions;
 
   Slopes(int segments, int mounts);
-  int mounts() const { return mounts_; }
+  // Writes a row for each parameter that is asked for, at an equilibrium at which the problem has its gradient, while
+  // the gaps in `held` stay closed. Leaves out those that the others imply, whose multipliers keep still, and returns
+  // their number; -1 where the Hessian is singular, or gaps all but depend on each other, as those of cables that lock
+  // a robot.
+  int differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held,
+                    const SlopeRequest& request, double* rows);
 
-  // Writes a row for each parameter, with those of the obstacles or not, at an equilibrium at which the problem has its
-  // gradient, while the gaps in `held` stay closed. Leaves out those that the others imply, whose multipliers keep
-  // still, and returns their number; -1 where the Hessian is singular, or gaps all but
-  // depend on each other, as those of cables that lock a robot.
-  int differentiate(const ContactProblem& problem, const Iterate& at, const ActiveSet& held, bool in_obstacles,
-                    double* rows);
+  // Of the last call that found slopes, along a motion of the cables: the slope of the multiplier of a gap that was
+  // held, or 0 where others imply it; and the slope of the gap of a contact that was not.
+  double multiplier_along(int contact, const Vec<Model::kCables>& motion) const;
+  double gap_along(const ContactProblem& problem, int contact, const Vec<Model::kCables>& motion) const;
 
  private:
   static constexpr int kSpace = Model::kSpace, kInputs = Model::kInputs, kCables = Model::kCables;
@@ -83,6 +94,7 @@ class Slopes {
     Multipliers changes;  // of the held gaps, then of their multipliers
   };
 
+  bool factor(const ContactProblem& problem, const Iterate& at, const ActiveSet& held);
   void find_touches(const ContactProblem& problem, const Iterate& at);
   void find_input(const ContactProblem& problem, const Iterate& at, int number);
   void move_nodes(const std::vector<InputSlope<Model>>& laws, Input& input) const;
@@ -90,14 +102,21 @@ class Slopes {
   void add_own_gaps(const ContactProblem& problem, const ActiveSet& active, Input& input) const;
   void find_within();
   void add_cable_rows(int contacts, int cables);
+  void add_input_row(int parameter, int input);
   void add_obstacle_row(const ContactProblem& problem, int obstacle, int motion, int first);
   Row& add_row(int parameter, int input, int obstacle);
   void respond();
   void finish(const ContactProblem& problem, const Iterate& at, Row& row, double* to) const;
+  double gap_slope(const ContactProblem& problem, int contact, const Row& row) const;
+  void add_own_motion(const ContactProblem& problem, int contact, double* slopes, int size) const;
   double tension_slope(const Row& row, int cable) const;
   void write_forces(const ContactProblem& problem, const Row& row, double* to) const;
 
   int segments_, mounts_;
+  int cables_ = 0;
+  int asked_ = 0;       // number of the inputs that are asked for
+  bool still_ = false;  // whether no parameter moves a control: of a robot of the paper's models that nothing touches
+  int reach_ = 0;       // the segment from which on the nodes' states have no part in the Hessian
   KktSystem kkt_;
   ActiveSetQp<Model> qp_;
   InputSlopes<Model> laws_;
@@ -105,6 +124,7 @@ class Slopes {
   Mat<kInputs, kInputs> within_;  // second derivatives of the Lagrangian in the inputs, at fixed controls
   ActiveSet held_;                // the gaps that stay closed
   std::vector<Touch> touches_;
+  std::vector<State> load_forces_;  // scratch
   std::vector<Row> rows_;
   int used_ = 0;  // of the rows
   std::vector<typename KktSystem::Forcing> forcings_;

@@ -13,10 +13,11 @@ enum class Reason { kNone, kFolded, kWork, kStuck };
 struct StepResult {
   Status status = Status::kConverged;
   Reason reason = Reason::kNone;
-  int iterations = 0;        // of Newton's method
-  int factorizations = 0;    // of the KKT system
-  bool interrupted = false;  // amid the step, which wrote nothing then
-  double scene = 1;          // part of their way that moving obstacles have gone
+  int iterations = 0;           // of Newton's method
+  int factorizations = 0;       // of the KKT system
+  bool interrupted = false;     // amid the step, which wrote nothing then
+  double scene = 1;             // part of their way that moving obstacles have gone
+  bool differentiated = false;  // whether slopes of the step were asked for and found
 };
 
 // Residuals of the KKT conditions, without units: the largest slope of the Lagrangian in a control [rad²], the largest
