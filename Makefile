@@ -14,7 +14,7 @@ SEED ?= 1
 FUZZ ?= 45
 CLIENTS ?= core rllib tianshou d3rlpy
 WHEELS = build/clients/wheels
-KERNEL_SOURCES = CMakeLists.txt $(wildcard solver/native/* solver/native/*/*) solver/common/gap_laws.py solver/planar/formulation.py solver/spatial/arc.py solver/spatial/formulation.py solver/codegen.py
+KERNEL_SOURCES = CMakeLists.txt $(wildcard solver/native/* solver/native/*/*) solver/common/gap_laws.py solver/common/operations.py solver/common/transition_laws.py solver/planar/formulation.py solver/spatial/arc.py solver/spatial/formulation.py solver/codegen.py
 
 demo: $(INSTALL)  ## train PPO, evaluate it beside the classical controllers, write figures and videos to runs/demo
 	$(BIN)/ccr-gym train --run runs/demo

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from agents.estimation.robot import RobotEstimator as RobotEstimator
     from agents.learning.actor import LearnedPolicy as LearnedPolicy
     from agents.learning.differentiable import differentiable as differentiable
+    from agents.learning.differentiable_env import DifferentiableVectorEnv as DifferentiableVectorEnv
     from agents.learning.memory import MemoryVecEnv as MemoryVecEnv
     from agents.learning.pretrained import trained as trained
     from agents.learning.sb3_adapter import SB3VecEnv as SB3VecEnv
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
 PART_OF = "ccr-gym"  # tells this package from others of its name
 _MODULES = {
+    "DifferentiableVectorEnv": "learning.differentiable_env",
     "Episode": "benchmark.evaluate",
     "ForceController": "controllers.force",
     "HarmonicController": "controllers.harmonic",

@@ -1,5 +1,7 @@
 """Count the instructions of the kernel on fixed replays of the contact mixes; unlike times, they are reproducible.
 
+Whole steps of environments are counted in a vector of them, from Python, as the difference of two runs.
+
 Needs valgrind. ``python benchmarks/instructions.py`` compares with ``instructions.json``; ``--update`` rewrites it.
 """
 
@@ -16,16 +18,20 @@ from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 
+import ccr_gym  # noqa: F401 - registers the environments
 from agents.bench import space
 from agents.bench.kernel import PlanarStep, contact_mix
 from solver import Robot
 from solver.common.obstacle import SHAPES
 
-HERE = Path(__file__).parent
+HERE, ROOT = Path(__file__).parent, Path(__file__).parents[1]
 RECORDED = HERE / "instructions.json"
 STEPS = 2000
+ENVS, SHORT, LONG = 64, 20, 60  # environments of a vector, and steps of both runs
+PLAYED = {"environment": ("ideal", 0.0), "environment, realistic, by force": ("realistic", 2.0)}  # sensing, gain
 
 
 def planar(model: str) -> list[PlanarStep]:
@@ -83,16 +89,47 @@ def count(program: Path, recording: Path, what: str = "step") -> float:
     """Return the instructions per step of what the program does with a recording."""
     command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={recording}.out", program, recording, what]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    refs = re.search(r"refs:\s+([\d,]+)", done.stderr)
+    return instructions_in(done.stderr) / int(done.stdout)
+
+
+def play(sensing: str, gain: float, steps: int) -> None:
+    """Play steps of a vector of environments: at random, or proportional to the missing force."""
+    envs = gymnasium.make_vec("CCR/PushObstacle-v1", ENVS, "vector_entry_point", sensing=sensing)
+    info, generator = envs.reset(seed=0)[1], np.random.default_rng(0)
+    for _ in range(steps):
+        missing = info["desired_force"] - np.linalg.norm(info["force_true"], axis=1)
+        actions = generator.uniform(-1, 1, ENVS) if gain == 0 else gain * missing / info["desired_force"]
+        info = envs.step(np.clip(actions, -1, 1)[:, None])[-1]
+
+
+def count_environment(sensing: str, gain: float) -> float:
+    """Return the instructions per step of an environment in a vector, Python's included."""
+    found = []
+    for steps in (SHORT, LONG):
+        played = [sys.executable, "-m", "benchmarks.instructions", "--play", sensing, str(gain), str(steps)]
+        command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", *played]
+        fixed = {**os.environ, "PYTHONHASHSEED": "0", "OMP_NUM_THREADS": "1"}
+        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT, env=fixed)
+        found.append(instructions_in(done.stderr))
+    return (found[1] - found[0]) / (LONG - SHORT) / ENVS
+
+
+def instructions_in(output: str) -> int:
+    """Return the number of instructions that callgrind reports."""
+    refs = re.search(r"refs:\s+([\d,]+)", output)
     assert refs is not None
-    return int(refs[1].replace(",", "")) / int(done.stdout)
+    return int(refs[1].replace(",", ""))
 
 
 def main() -> None:
     """Count the instructions, compare them with those on record, and update the record if asked to."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--update", action="store_true")
+    parser.add_argument("--play", nargs=3, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    if arguments.play:
+        sensing, gain, steps = arguments.play
+        return play(sensing, float(gain), int(steps))
     if not shutil.which("valgrind"):
         raise SystemExit("valgrind not found; it counts the instructions: apt-get install valgrind")
     found = {}
@@ -102,11 +139,12 @@ def main() -> None:
         for name, mix in MIXES.items():
             write(mix(), folder / name)
             found[name] = round(count(program, folder / name))
+    found |= {name: round(count_environment(*how)) for name, how in PLAYED.items()}
     before = json.loads(RECORDED.read_text()) if RECORDED.exists() else {}
     for name, instructions in found.items():
         recorded = before.get(name)
         change = f", {instructions / recorded - 1:+.1%} against {recorded:,} recorded" if recorded else ""
-        print(f"{name}: {instructions:,} instructions per step, including reading the recording{change}")
+        print(f"{name}: {instructions:,} instructions per step{change}")
     if arguments.update:
         RECORDED.write_text(json.dumps(found, indent=2) + "\n")
 

@@ -43,7 +43,7 @@ def take_evaluation(path: Path) -> None:
     if not (isinstance(found, dict) and found.get("results")):
         sys.exit(f"{path} holds no results of policies: give the evaluation.json that ccr-gym evaluate writes")
     kept = [{key: result[key] for key in ("policy", "env_id", "sensing", "summary")} for result in found["results"]]
-    save("evaluation", {**found, "results": [_rounded(result) for result in kept]})
+    save("evaluation", {**found, "results": [rounded(result) for result in kept]})
 
 
 def take_bench(path: Path) -> None:
@@ -55,14 +55,15 @@ def take_bench(path: Path) -> None:
     found = json.loads(path.read_text())
     if not any(name.startswith("mujoco ") for name in found["peers"]):
         sys.exit(f"{path} has nothing of MuJoCo: pip install mujoco, and measure again")
-    save("bench", _rounded(found))
+    save("bench", rounded(found))
 
 
-def _rounded(value: Any) -> Any:
+def rounded(value: Any) -> Any:
+    """Return numbers of a result with six decimals."""
     if isinstance(value, dict):
-        return {key: _rounded(entry) for key, entry in value.items()}
+        return {key: rounded(entry) for key, entry in value.items()}
     if isinstance(value, list):
-        return [_rounded(entry) for entry in value]
+        return [rounded(entry) for entry in value]
     return round(value, 6) if isinstance(value, float) else value
 
 
@@ -112,6 +113,8 @@ BLOCKS: dict[str, tuple[Callable[..., str], tuple[str, ...]]] = {  # what makes 
     "statuses": (speed.statuses_line, ("bench",)),
     "mujoco": (speed.mujoco_line, ("bench",)),
     "instructions": (speed.instructions_table, ("../../benchmarks/instructions",)),
+    "memo": (speed.cache_table, ("cache",)),
+    "compiled shapes": (speed.starts_line, ("cache",)),
     "single-file ppo": (speed.ppo_line, ("examples_ppo",)),
     "demo": (speed.demo_line, ("demo",)),
 }

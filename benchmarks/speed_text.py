@@ -15,6 +15,7 @@ ENDS = {
     "GAVE_UP": "given up",
 }
 Found = Mapping[str, Any]
+PLAYED = ("environment", "environment, realistic, by force")  # whose whole steps are counted
 
 
 def kernel_table(bench: Found) -> str:
@@ -114,10 +115,34 @@ def instructions_table(counts: Found) -> str:
         "plane, paper's model and rod": ("paper", "rod"),
         "space, paper's model": ("space",),
         "space, rod with two, three, four cables": cables,
+        "`CCR/PushObstacle-v1` in a vector of 64, Python and all: ideal at random, realistic by force": PLAYED,
     }
     return table(
         ("model", "instructions a step"),
         ((name, ", ".join(digits(counts[key], 3) for key in keys)) for name, keys in rows.items()),
+    )
+
+
+def cache_table(found: Found) -> str:
+    """Return the table of what the caches save."""
+    names = {
+        "replays": "five replays of recorded episodes, each from a reset",
+        "search": "in contact, a tree of depth 3 with 5 actions, grown anew from every equilibrium",
+        "walk": "random steps",
+    }
+    rows = [
+        (name, f"{100 * found[key]['hit_rate']:.0f} %", f"{digits(found[key]['ratio'], 3)} ×")
+        for key, name in names.items()
+    ]
+    return table(("steps", "remembered", "CPU time without the memo, over that with it"), rows)
+
+
+def starts_line(found: Found) -> str:
+    """Return what compiled shapes cost at a start."""
+    first, damaged = digits(found["starts"]["first"]), digits(found["starts"]["damaged"])
+    return (
+        f"The first solver of a process among a shape that is not in the store takes {first} times the CPU time of one "
+        f"that finds it there; where the entry is damaged it is built again, in {damaged} times that time."
     )
 
 

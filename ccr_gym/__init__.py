@@ -8,6 +8,7 @@ check_kernel()
 warn_of_foreign_agents()
 
 from ccr_gym.actions import ActionSpec
+from ccr_gym.arrays import StepSlopes
 from ccr_gym.contact_env import ContactEnv
 from ccr_gym.envs import (
     BracedPushEnv,
@@ -71,6 +72,7 @@ __all__ = [
     "SpatialPush",
     "SpatialPushEnv",
     "SpatialSettings",
+    "StepSlopes",
     "Task",
     "TrackForce",
     "TrackForceEnv",

@@ -1,23 +1,22 @@
 """Adapters from environments to robots: those of the plane, the same with insertion, and those in space."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import require
-from ccr_gym.quantities import EnvIndex, Quantity, as_scalar, norm
+from ccr_gym.quantities import EnvIndex, Quantity
 from ccr_gym.scales import RADIUS_SPAN
 from ccr_gym.sensing import Body
 from ccr_gym.settings import AnySettings, InsertionSettings, Settings, SpatialSettings
 from solver import BatchSolver, ReferenceBatch, Scene, Solver
+from solver.common import transition
 from solver.common.batch import BaseBatch
-from solver.common.geometry import subdivide
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
-from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialSolver, sides
+from solver.spatial import Capsule, Cylinder, SpatialBatchSolver, SpatialSolver
 
 SettingsT = TypeVar("SettingsT", bound=AnySettings)
 PlanarSettingsT = TypeVar("PlanarSettingsT", bound=Settings)
@@ -66,6 +65,7 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         self.settings, self.layout = settings, layout
         self.actuation, self.scales = settings.actuation, settings.scales
         self.actions = self._action_spec()
+        self._reach_mm = settings.reach_mm  # which is computed anew at each access
 
     @property
     def body(self) -> Body:
@@ -88,20 +88,23 @@ class RobotAdapter(ABC, Generic[SettingsT]):
             ValueError: As the solver.
         """
 
+    @property
+    def kernel_actuation(self) -> transition.Actuation:
+        """The actuation as the kernel takes it."""
+        actuation, actions = self.actuation, self.actions
+        ends = {"low": actions.low_mm, "high": actions.high_mm, "increment": actions.increment_mm}
+        recovery = None if actuation.recovery is None else np.ascontiguousarray(actuation.recovery)
+        return transition.Actuation(matrix=np.ascontiguousarray(actuation.matrix), recovery=recovery, **ends)
+
     @staticmethod
     def lines_mm(robot: AnyRobot) -> np.ndarray:
-        """Return the positions of a robot's lines across its disks, ``(lines, 1, d − 1)`` [mm]."""
-        lines = np.array(robot.lines_mm)
-        return lines.reshape(len(lines), 1, -1)
+        """Return where a robot's lines of points that can touch cross its disks, ``(lines, d − 1)`` [mm]."""
+        return np.array(robot.lines_mm).reshape(len(robot.lines_mm), -1)
 
+    @property
     @abstractmethod
-    def points(self, blocks: np.ndarray, lines_mm: np.ndarray) -> np.ndarray:
-        """Return the points that can touch, ``(..., lines, positions, d)`` [mm].
-
-        Args:
-            blocks: Equilibria, ``(..., size)``.
-            lines_mm: Positions of the lines, as of :meth:`lines_mm`, of each robot or of all [mm].
-        """
+    def pose_scale(self) -> np.ndarray:
+        """What errors of places and turns of a disk are observed in, ``(d,)`` in the plane x, y and angle."""
 
     def force(self, blocks: np.ndarray, target: int | None) -> np.ndarray:
         """Return the contact force of an obstacle, of all together for ``None``, ``(..., d)`` [N]."""
@@ -113,22 +116,9 @@ class RobotAdapter(ABC, Generic[SettingsT]):
     def pose_features(self) -> Features:
         """Return the observed features of the shape."""
 
-    @abstractmethod
-    def disturb_pose(self, entries: Mapping[str, np.ndarray], errors: np.ndarray) -> None:
-        """Add errors of a camera or fibre to the observed features of the shape.
-
-        Args:
-            entries: Observed entries, ``(..., k)`` each, written in place.
-            errors: Errors of places and turns of all disks, ``(..., n + 1, d + turns)`` [mm, rad].
-        """
-
     def obstacle_features(self, scene: Scene) -> np.ndarray:
         """Return the observed numbers of the first obstacle, ``(obstacle_size,)``."""
         return np.zeros(0)
-
-    def clip(self, actions: np.ndarray) -> np.ndarray:
-        """Return actions ``(..., actions)`` within [−1, 1]."""
-        return np.asarray(np.minimum(np.maximum(actions.astype(float), -1.0), 1.0))
 
     def bounded(self, actuated_mm: np.ndarray) -> np.ndarray:
         """Return actuated coordinates ``(..., actions)`` within their bounds [mm]."""
@@ -144,25 +134,21 @@ class RobotAdapter(ABC, Generic[SettingsT]):
         """
         commands[index, :-1] = self.actuation.cables_mm(actuated_mm[..., : self.actions.commands])
 
-    def actuated_mm(self, blocks: np.ndarray, commanded_mm: np.ndarray) -> np.ndarray:
-        """Return the actuated coordinates that robots have reached, ``(..., actions)`` [mm].
+    @property
+    def actuator_numbers(self) -> int:
+        """How many numbers are read of the actuators: displacements and tensions, and the length of insertion."""
+        return 2 * len(self.settings.robot.cables) + self.actions.size - self.actions.commands
+
+    def info(self, actuators: np.ndarray) -> dict[str, Quantity]:
+        """Return displacements and tensions of the cables, of a single one as numbers.
 
         Args:
-            blocks: Equilibria, ``(..., size)``.
-            commanded_mm: Actuated coordinates that were commanded, ``(..., actions)`` [mm].
+            actuators: What is read of the actuators of one robot or of many, ``(k, ...)``.
         """
-        return self.bounded(self.actuation.reached(commanded_mm, self.layout.cables(blocks)))
-
-    def signed(self, blocks: np.ndarray, tensions: np.ndarray) -> np.ndarray:
-        """Return tensions ``(..., cables)``, negative where the other cable of a pair is pulled."""
-        return tensions
-
-    def info(self, blocks: np.ndarray, index: int | slice) -> dict[str, Quantity]:
-        """Return displacements and tensions of the cables, of a single one as numbers."""
-        cables, tensions = self.layout.cables(blocks), self.layout.tensions(blocks)
-        if cables.shape[-1] == 1:
-            return {"cable_mm": as_scalar(cables[..., 0], index), "tension": as_scalar(tensions[..., 0], index)}
-        return {"cable_mm": cables.copy(), "tension": tensions.copy()}
+        cables = len(self.settings.robot.cables)
+        if cables == 1:
+            return {"cable_mm": actuators[0], "tension": actuators[1]}
+        return {"cable_mm": actuators[:cables].T.copy(), "tension": actuators[cables : 2 * cables].T.copy()}
 
     def _action_spec(self) -> ActionSpec:
         """Return the actuated coordinates.
@@ -183,9 +169,10 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
 
     settings_class, space, turns = Settings, 2, 1
 
-    def __init__(self, settings: PlanarSettingsT, layout: Layout) -> None:
-        super().__init__(settings, layout)
-        self._pose_scale = 1 / np.array([*2 * [settings.reach_mm], np.pi])  # of x, y and disk angle
+    @property
+    def pose_scale(self) -> np.ndarray:
+        """What x, y and the angle of a disk are multiplied with."""
+        return 1 / np.array([*2 * [self.settings.reach_mm], np.pi])
 
     @classmethod
     def make_batch(cls, settings: PlanarSettingsT, count: int, obstacles: int, threads: int) -> BaseBatch:
@@ -198,22 +185,11 @@ class PlanarAdapter(RobotAdapter[PlanarSettingsT]):
         """Raise an error if the robot cannot be put among these obstacles; see the base class."""
         Solver(settings.robot, scene)
 
-    def points(self, blocks: np.ndarray, lines_mm: np.ndarray) -> np.ndarray:
-        """Return the points that can touch, ``(..., lines, positions, 2)`` [mm]; see the base class."""
-        nodes, axes = self.layout.nodes(blocks), self.layout.frames(blocks)
-        lines = nodes[..., None, :, :2] + lines_mm * axes[..., None, :, :]
-        return subdivide(lines, self.settings.robot.between)
-
     def pose_features(self) -> Features:
         """Return position and disk angle of every node."""
         robot = self.settings.robot
         nodes = self.layout.nodes(np.arange(self.layout.size)).ravel()
-        return {"nodes": Feature(nodes, np.tile(self._pose_scale, robot.segments + 1))}
-
-    def disturb_pose(self, entries: Mapping[str, np.ndarray], errors: np.ndarray) -> None:
-        """Add errors to positions and disk angles; see the base class."""
-        nodes = entries["nodes"]
-        nodes += (errors * self._pose_scale).reshape(nodes.shape)
+        return {"nodes": Feature(nodes, np.tile(self.pose_scale, robot.segments + 1))}
 
 
 class InsertionAdapter(PlanarAdapter[InsertionSettings]):
@@ -226,14 +202,9 @@ class InsertionAdapter(PlanarAdapter[InsertionSettings]):
         super().write_command(commands, actuated_mm, index)
         commands[index, -1] = actuated_mm[..., -1]
 
-    def actuated_mm(self, blocks: np.ndarray, commanded_mm: np.ndarray) -> np.ndarray:
-        """Return what was reached of cables and length, ``(..., actions)`` [mm]; see the base class."""
-        cables = self.actuation.reached(commanded_mm[..., :-1], self.layout.cables(blocks))
-        return self.bounded(np.concatenate([cables, self.layout.length(blocks)], axis=-1))
-
-    def info(self, blocks: np.ndarray, index: int | slice) -> dict[str, Quantity]:
-        """Return displacements and tensions of the cables, and the length of the robot."""
-        return super().info(blocks, index) | {"length_mm": as_scalar(self.layout.length(blocks)[..., 0], index)}
+    def info(self, actuators: np.ndarray) -> dict[str, Quantity]:
+        """Return displacements and tensions of the cables, and the length of the robot; see the base class."""
+        return super().info(actuators) | {"length_mm": actuators[-1]}
 
     def _action_spec(self) -> ActionSpec:
         cables, (shortest, longest) = super()._action_spec(), self.settings.robot.lengths_mm
@@ -256,17 +227,10 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
         """Raise an error if the robot cannot be put among these obstacles; see the base class."""
         SpatialSolver(settings.robot, scene)
 
-    def points(self, blocks: np.ndarray, lines_mm: np.ndarray) -> np.ndarray:
-        """Return the points that can touch, ``(..., lines, positions, 3)`` [mm]; see the base class."""
-        nodes, frames = self.layout.nodes(blocks)[..., None, :, :], self.layout.frames(blocks)[..., None, :, :, :]
-        lines = nodes + lines_mm[..., :1] * frames[..., 0] + lines_mm[..., 1:] * frames[..., 1]
-        return subdivide(lines, self.settings.robot.between)
-
-    def signed(self, blocks: np.ndarray, tensions: np.ndarray) -> np.ndarray:
-        """Return tensions of the paper's model with the signs of its displacements; see the base class."""
-        if self.settings.robot.model == "rod":
-            return tensions
-        return np.asarray(sides(self.layout.cables(blocks)) * tensions)
+    @property
+    def pose_scale(self) -> np.ndarray:
+        """What x, y and z of a disk are multiplied with; its axes are observed as they are."""
+        return np.full(3, 1 / self.settings.reach_mm)
 
     def pose_features(self) -> Features:
         """Return the position of every node, and the first and last axis of its disk."""
@@ -275,24 +239,16 @@ class SpatialAdapter(RobotAdapter[SpatialSettings]):
         nodes = self.layout.nodes(columns).ravel()
         return {"frames": Feature(axes, 1.0), "nodes": Feature(nodes, 1 / self.settings.reach_mm)}
 
-    def disturb_pose(self, entries: Mapping[str, np.ndarray], errors: np.ndarray) -> None:
-        """Add errors to positions, and turn the axes of the disks by rotation vectors; see the base class."""
-        nodes, frames = entries["nodes"], entries["frames"]
-        nodes += (errors[..., :3] / self.settings.reach_mm).reshape(nodes.shape)
-        axes = frames.reshape(*errors.shape[:-1], 2, 3)
-        turned = axes + np.cross(errors[..., None, 3:], axes)  # to first order, then of unit length again
-        frames[...] = (turned / norm(turned)[..., None]).reshape(frames.shape)
-
     def obstacle_features(self, scene: Scene) -> np.ndarray:
         """Return centre, axis direction and radius of the first obstacle, in units of L, zeros where it has none."""
-        features, length = np.zeros(self.obstacle_size), self.settings.reach_mm
-        for obstacle in scene.obstacles[:1]:
-            features[:3] = np.divide(obstacle.extent.center, length)
-            if isinstance(obstacle, Capsule | Cylinder):
-                axis = np.subtract(obstacle.end, obstacle.start)
-                features[3:6] = axis / np.linalg.norm(axis)
-            features[6] = getattr(obstacle, "radius", 0.0) / (RADIUS_SPAN * length)
-        return features
+        if not len(scene):
+            return np.zeros(self.obstacle_size)
+        obstacle, length, direction = scene.obstacles[0], self._reach_mm, np.zeros(3)
+        if isinstance(obstacle, Capsule | Cylinder):
+            axis = np.subtract(obstacle.end, obstacle.start)
+            direction = axis / np.linalg.norm(axis)
+        size = getattr(obstacle, "radius", 0.0) / (RADIUS_SPAN * length)
+        return np.array([*(x / length for x in obstacle.extent.center), *direction.tolist(), size])
 
 
 AnyAdapter = RobotAdapter[Any]  # of whatever settings its task has

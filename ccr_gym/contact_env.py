@@ -15,8 +15,7 @@ from ccr_gym.episodes import EpisodeBatch
 from ccr_gym.goals import compute_reward, goal_space
 from ccr_gym.observation import Observation
 from ccr_gym.pictures import Pictures
-from ccr_gym.readings import ForceReading, PrivilegedState
-from ccr_gym.reward import TERMS
+from ccr_gym.readings import PrivilegedState
 from ccr_gym.scales import Scales
 from ccr_gym.settings import AnySettings
 from ccr_gym.state import EnvState, check_state, restored, state_of
@@ -28,7 +27,7 @@ Info = dict[str, Any]  # Gymnasium's own type of infos and options
 RENDER_MODES = ["human", "rgb_array"]
 DT_S = 0.05  # time that a step stands for; equilibria know none, so any other is as good where it is slow enough
 METADATA: Info = {"render_modes": RENDER_MODES, "render_fps": round(1 / DT_S), "dt": DT_S}
-SCALARS: dict[type, Callable[[Any], Any]] = {float: np.float64, int: np.int64, bool: bool}
+FIRST = np.zeros(1, np.int64)  # index of the only robot
 SPACES = {2: "the plane", 3: "space"}
 
 
@@ -91,8 +90,7 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             raise
         self._started = True
         self._film(None)
-        reading = self._episodes.read(0)
-        return self._observation(reading), _numpy(self._episodes.infos(reading, (0.0,) * len(TERMS), 0))
+        return self._episodes.observation(0), self._episodes.info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, SupportsFloat, bool, bool, Info]:
         """Move the cables by ``action · max_increment_mm``, as far as tension limit and obstacles allow.
@@ -102,14 +100,12 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
             ValueError: If the action is not finite real numbers of the right shape; the state does not change.
         """
         self._check_started("step")
-        checked = check_array("action", action, self._shape)
         episodes = self._episodes
-        episodes.step(episodes.adapter.clip(checked), 0)
-        reading = episodes.read(0)
-        terms = tuple(map(float, episodes.rewards(reading, 0)))
-        reward = float(episodes.total_reward(reading, terms, 0))
-        self._film(reward)
-        return self._observation(reading), reward, False, False, _numpy(episodes.infos(reading, terms, 0))
+        episodes.step(check_array("action", action, self._shape)[None], FIRST)
+        reward = float(episodes.rewards(0))
+        if self.render_mode is not None:
+            self._film(reward)
+        return episodes.observation(0), reward, False, False, episodes.info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture, ``(H, W, 3)`` uint8, or show it in a window: robot, obstacles, forces and set-point."""
@@ -240,12 +236,20 @@ class ContactEnv(gymnasium.Env[Observation, np.ndarray]):
         self._check_started("probe")
         return np.asarray(self._episodes.probe(check_array("actuated_mm", actuated_mm, self._shape)[None])[0])
 
+    def force_slopes(self) -> np.ndarray:
+        """Return the slopes of the regulated contact force in the actuated coordinates, ``(actions, d)`` [N/mm].
+
+        They are those of :meth:`probe` at the present coordinates.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+        """
+        self._check_started("force_slopes")
+        return np.asarray(self._episodes.force_slopes()[0])
+
     def _check_started(self, asked: str) -> None:
         if not self._started:
             raise gymnasium.error.ResetNeeded(f"call reset() before {asked}")
-
-    def _observation(self, reading: ForceReading) -> Observation:
-        return self._episodes.shaped(self._episodes.observe(reading, 0), reading)
 
 
 def single_spaces(episodes: EpisodeBatch, settings: AnySettings) -> tuple[spaces.Space[Observation], spaces.Box]:
@@ -279,11 +283,6 @@ def make_settings(name: str, task: AnyTask, given: Mapping[str, object], others:
     valid = [*others, *(declared.name for declared in fields(settings_class))]
     check_names(name, given, valid, "got an unexpected keyword argument")  # Python's words, which TorchRL looks for
     return make(**given)
-
-
-def _numpy(infos: Info) -> Info:
-    """Return infos whose numbers have a dtype, which some clients look at; others take no flag that has one."""
-    return {key: SCALARS.get(type(value), np.asarray)(value) for key, value in infos.items()}
 
 
 def _given_assignment(options: Info | None, task: AnyTask, scales: Scales) -> Assignment | None:

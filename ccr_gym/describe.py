@@ -8,12 +8,13 @@ from gymnasium import spaces
 
 from ccr_gym.adapters import AnyAdapter
 from ccr_gym.observation import Observer
-from ccr_gym.reward import ACCURACY_RATE, CLEARANCE_SPAN, SUCCESS_ERROR
+from ccr_gym.reward import SUCCESS_ERROR
 from ccr_gym.scales import AHEAD, RADIUS_SPAN
 from ccr_gym.settings import AnySettings
 from ccr_gym.task import AnyTask
 from ccr_gym.tasks import LEVELS
 from solver import Robot
+from solver.common.transition_laws import ACCURACY_RATE, CLEARANCE_SPAN
 
 WIDTH = 116
 AXES = {2: "x and y", 3: "x, y, z"}

@@ -6,10 +6,12 @@ noise however many are stepped together.
 """
 
 import math
+from collections.abc import Sequence
 from functools import cache
-from itertools import accumulate
 
 import numpy as np
+
+from solver.common.transition import correlate
 
 TABLE_SIZE = 2**20  # a power of two, whose remainders are fast
 CORRELATION = 0.8  # of neighbouring disks, as of errors that add up along a fibre
@@ -20,23 +22,19 @@ def draw_start(generator: np.random.Generator) -> int:
     return int(generator.integers(TABLE_SIZE))
 
 
-def white(places: np.ndarray, size: int) -> np.ndarray:
-    """Return white noise of unit variance from places in the table on, ``(..., size)`` for places ``(...)``."""
-    return np.asarray(_table()[(places[..., None] + np.arange(size)) % TABLE_SIZE])
-
-
-def correlated(generator: np.random.Generator, count: int, size: int) -> np.ndarray:
-    """Return stationary noise of unit variance along a robot, correlated from disk to disk, ``(count, size)``.
+def correlated(generators: Sequence[np.random.Generator], count: int, size: int) -> np.ndarray:
+    """Return stationary noise of unit variance along robots, correlated from disk to disk, ``(k, count, size)``.
 
     An autoregressive process of first order: ``e_k = ρ e_{k−1} + √(1 − ρ²) w_k``.
     """
-    white, fresh = generator.standard_normal((count, size)), math.sqrt(1 - CORRELATION**2)
-    columns = (accumulate(column, lambda e, w: CORRELATION * e + fresh * w) for column in white.T.tolist())
-    return np.array(list(zip(*columns, strict=True)))  # numbers of Python, which are faster here than rows of numpy
+    noise = np.array([generator.standard_normal((count, size)) for generator in generators])
+    correlate(noise, CORRELATION, math.sqrt(1 - CORRELATION**2))
+    return noise
 
 
 @cache
-def _table() -> np.ndarray:
+def noise_table() -> np.ndarray:
+    """Return the table that the kernel reads white noise of unit variance from."""
     table = np.random.default_rng(0).standard_normal(TABLE_SIZE)
     table.setflags(write=False)
     return table

@@ -1,44 +1,26 @@
-"""The observation: its entries, their scales and bounds, and its flat form, for one environment or many."""
+"""The observation: its entries, their scales and bounds; the kernel writes its flat form."""
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Set
 
 import numpy as np
 from gymnasium import spaces
 
 from ccr_gym.adapters import AnyAdapter, Feature, Features
-from ccr_gym.quantities import Quantity
 from ccr_gym.randomization import DRAWN_SIZE
 from ccr_gym.scales import AHEAD
 from ccr_gym.sensing import DELAYED_KEYS
 from ccr_gym.task import AnyTask
+from solver.common.transition import ObserverSettings
 
 Observation = np.ndarray | dict[str, np.ndarray]
 SENSOR_KEYS = ("force_error", "force_measured")  # absent without a force sensor
 NOT_NEGATIVE = ("length", "desired_ahead", "contact", "share")
 ENCODER_KEYS = ("cable", "length")  # what the encoders read, in the order of the actions
-
-
-class Known(NamedTuple):
-    """What the nominal model and the load cells at the motors tell of one robot, or of many.
-
-    Attributes:
-        contact: Contact flags of the model, ``(..., lines · positions)``.
-        tensions: Measured tensions, ``(..., c)`` [N].
-        free_forces: As of :class:`ccr_gym.estimation.ForceEstimator`, ``(..., commands)`` [N].
-        levers: Likewise, ``(..., commands)``.
-        share: Share of the model's contact forces that is on the regulated obstacle, 0 where nothing touches.
-    """
-
-    contact: np.ndarray
-    tensions: np.ndarray
-    free_forces: np.ndarray
-    levers: np.ndarray
-    share: Quantity
+POSE_KEYS = ("nodes", "frames")  # what a camera or a fibre shows
 
 
 class Observer:
-    """Writes observations as scaled float32 rows within the bounds of their space.
+    """Columns of observations, which are scaled float32 rows within the bounds of their space.
 
     Entries are features of the equilibrium block, or inputs: forces and obstacle features that are computed outside.
 
@@ -46,6 +28,7 @@ class Observer:
         dict_space: Space of the named entries.
         flat_space: Space of their concatenation.
         delayed: Which columns are delayed by latency, ``(k,)`` bool.
+        kernel_settings: What the kernel writes them by.
 
     Args:
         adapter: Adapter of the robot.
@@ -64,79 +47,42 @@ class Observer:
         self.flat_space = spaces.Box(self._low, self._high)
         ends = np.cumsum([sizes[key] for key in keys]).tolist()
         self._columns = {key: slice(end - sizes[key], end) for key, end in zip(keys, ends, strict=True)}
-        # A single number is written to a column, without an axis.
-        self._input_columns = {
-            key: self._columns[key] if size > 1 else self._columns[key].start
-            for key, size in input_sizes.items()
-            if key in keys
-        }
         self._source, self._scale = np.zeros(self._low.size, int), np.zeros(self._low.size)
         for key in features.keys() & keys:
             if key not in input_sizes:
                 self._source[self._columns[key]], self._scale[self._columns[key]] = features[key]
-        self.delayed = np.zeros(self._low.size, bool)
+        self._force_n = adapter.settings.force_span * adapter.scales.force_n
+        self.delayed = np.zeros(self.columns, bool)
         for key in DELAYED_KEYS:
             self.delayed[self._columns.get(key, slice(0))] = True
-        self._force_n = adapter.settings.force_span * adapter.scales.force_n
-        self._tension_n = adapter.settings.tension_span * adapter.scales.tension_n
-        self._lever_scale = adapter.scales.travel_mm / adapter.scales.length_mm
-        self._disturb_pose = adapter.disturb_pose
+        self.kernel_settings = self._make_settings(adapter, input_sizes.keys() & keys)
+
+    @property
+    def columns(self) -> int:
+        """Numbers of an observation."""
+        return int(self._low.size)
+
+    def _make_settings(self, adapter: AnyAdapter, inputs: Set[str]) -> ObserverSettings:
+        """Return what the kernel writes observations by."""
+        scales = adapter.scales
+        spans = {key: (columns.start, columns.stop - columns.start) for key, columns in self._columns.items()}
         most = np.maximum(np.abs(adapter.actions.low_mm), adapter.actions.high_mm)
-        self._encoder_scale = 1 / most
-
-    def rows(
-        self, blocks: np.ndarray, forces: Mapping[str, Quantity], constants: Mapping[str, np.ndarray]
-    ) -> np.ndarray:
-        """Return flat observations before they are clipped, ``(k,)`` for one robot, ``(N, k)`` for many.
-
-        Args:
-            blocks: Equilibria, ``(size,)`` or ``(N, size)``.
-            forces: Inputs that are forces, numbers or ``(..., d)`` [N].
-            constants: Inputs that stay as they are in an episode, scaled already, ``(..., k)``.
-        """
-        one = blocks.ndim == 1
-        rows = blocks.take(self._source) if one else blocks[:, self._source]
-        rows *= self._scale
-        for key, force in forces.items():
-            columns = self._input_columns.get(key)
-            if columns is not None:  # one row is written faster without an ellipsis
-                rows[columns if one else (..., columns)] = force / self._force_n
-        for key, features in constants.items():
-            if (columns := self._input_columns.get(key)) is not None:
-                rows[..., columns] = features
-        return rows
-
-    def write_encoders(self, rows: np.ndarray, motor_mm: np.ndarray) -> None:
-        """Write what the encoders of the motors read, ``(..., actions)`` [mm]."""
-        start, scaled = 0, motor_mm * self._encoder_scale
-        for key in ENCODER_KEYS:
-            if (columns := self._columns.get(key)) is not None:
-                count = columns.stop - columns.start
-                rows[..., columns] = scaled[..., start : start + count]
-                start += count
-
-    def write_sensed(self, rows: np.ndarray, known: Known, errors: np.ndarray) -> None:
-        """Write what is known and measured where sensing is not ideal.
-
-        Args:
-            rows: Observations, ``(..., k)``, written in place.
-            known: What the nominal model and the load cells at the motors tell.
-            errors: Errors of the seen shape, ``(..., n + 1, d + turns)`` [mm, rad].
-        """
-        entries = self.entries(rows)
-        entries["contact"][...] = known.contact
-        entries["tension"][...] = known.tensions / self._tension_n
-        entries["free_tension"][...] = known.free_forces / self._tension_n
-        entries["lever"][...] = known.levers * self._lever_scale
-        if "share" in entries:
-            entries["share"][..., 0] = known.share
-        self._disturb_pose(entries, errors)
-
-    def clip(self, rows: np.ndarray) -> np.ndarray:
-        """Return rows within the bounds of the space, as float32; overwrites the rows."""
-        np.maximum(rows, self._low, out=rows)
-        np.minimum(rows, self._high, out=rows)
-        return rows.astype(np.float32)
+        written = {*inputs, *POSE_KEYS, *(("contact",) if adapter.settings.sensors else ())}
+        return ObserverSettings(
+            source=self._source.tolist(),
+            factor=self._scale,
+            low=self._low.astype(float),
+            high=self._high.astype(float),
+            delayed=self.delayed,
+            entries={key: spans[key] for key in written if key in spans and key not in ENCODER_KEYS},
+            encoders=[spans[key] for key in ENCODER_KEYS if key in spans],
+            encoder_factor=1 / most,
+            pose_factor=adapter.pose_scale,
+            ahead=AHEAD,
+            force_n=self._force_n,
+            tension_n=adapter.settings.tension_span * scales.tension_n,
+            lever_unit=scales.length_mm / scales.travel_mm,
+        )
 
     @property
     def slices(self) -> dict[str, slice]:

@@ -11,26 +11,16 @@ class ForceReading(NamedTuple):
     """Contact forces of one robot, or of many, and their set-points.
 
     Attributes:
-        blocks: Equilibria, ``(..., size)``.
         force_true: Energy-based contact force on the robot, of the obstacle that matters, ``(..., d)`` [N].
         force_est: Its estimate, ``(..., d)`` [N].
-        force_paper: Its estimate by eq. 11, ``(..., d)`` [N].
         regulated: The one of them that is desired, ``(..., d)`` [N].
-        force: Magnitude of the regulated force [N].
         desired: Magnitude of the set-point [N].
-        goal: The set-point, a magnitude or ``(..., d)`` [N].
-        error: Relative force error.
     """
 
-    blocks: np.ndarray
     force_true: np.ndarray
     force_est: np.ndarray
-    force_paper: np.ndarray
     regulated: np.ndarray
-    force: Quantity
     desired: Quantity
-    goal: Quantity
-    error: Quantity
 
 
 class PrivilegedState(NamedTuple):

@@ -1,16 +1,10 @@
-"""The reward: named terms and their weights."""
+"""The reward: named terms and their weights; :mod:`solver.common.transition_laws` holds the formula."""
 
 from dataclasses import dataclass, fields
 
-import numpy as np
-
 from ccr_gym.checks import check_fields, check_number, checked
-from ccr_gym.quantities import Quantity
-from solver.common.operations import Operations
 
 MAX_WEIGHT = 1e6
-ACCURACY_RATE = 20.0  # of the decay of ``accuracy``, per relative force error
-CLEARANCE_SPAN = 5 / 9  # of ``approach`` [L]
 SUCCESS_ERROR = 0.05  # relative force error up to which a step is a success
 
 
@@ -40,34 +34,3 @@ class RewardWeights:
 
 
 TERMS = tuple(field.name for field in fields(RewardWeights))
-
-
-def reward_terms(
-    weights: RewardWeights,
-    force: Quantity,
-    desired: Quantity,
-    error: Quantity,
-    clearance: Quantity,
-    effort: Quantity,
-    operations: Operations,
-) -> tuple[Quantity, ...]:
-    """Return the weighted terms in the order of :data:`TERMS`; their sum is the reward.
-
-    Args:
-        weights: Their weights.
-        force: Magnitude of the contact force, zero without contact [N].
-        desired: Magnitude of the desired force [N].
-        error: Relative force error.
-        clearance: Smallest gap over the robot's length.
-        effort: Mean square of the action.
-        operations: Operations on numbers or on arrays, as the quantities are.
-    """
-    minimum, maximum, where = operations
-    excess = force / desired - 1.0
-    return (
-        -weights.force_error * minimum(error, 1.0),
-        weights.accuracy * np.exp(-ACCURACY_RATE * error),
-        -weights.overshoot * minimum(maximum(excess, 0.0), 1.0),
-        -weights.approach * where(force > 0, 0.0, minimum(maximum(clearance, 0.0) / CLEARANCE_SPAN, 1.0)),
-        -weights.effort * effort,
-    )

@@ -2,22 +2,25 @@
 
 import zlib
 from collections.abc import Sequence
+from math import isfinite
+from typing import Any
 
 import numpy as np
 
 from ccr_gym.adapters import AnyAdapter
 from ccr_gym.checks import check_array, check_type, refusal
-from ccr_gym.estimation import ForceEstimator, Measured
+from ccr_gym.estimation import ForceEstimator
 from ccr_gym.quantities import norm
 from ccr_gym.randomization import Drawn
 from ccr_gym.scales import Scales
 from ccr_gym.sensing import Imperfections
 from ccr_gym.settings import AnySettings
-from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment, check_force
-from solver import Scene, Status
+from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment, check_force, force_bounds
+from solver import Scene
 from solver.common.batch import BaseBatch
 from solver.common.checks import check_core
 from solver.common.robot import AnyRobot
+from solver.common.rows import as_slice
 
 MAX_SAMPLES = 1000
 PULL = 1 / 16  # cable displacement between the equilibria of a trial pull, of all sections together [a]
@@ -43,15 +46,16 @@ class Trials:
         if settings.randomize is not None:
             self._remedy += ", or narrow the ranges of randomize: not every robot that they allow can do it"
         self._shown_n = settings.force_span * adapter.scales.force_n  # which is made anew at each access
+        self._increment_mm = PULL * adapter.scales.travel_mm
         self._estimator = None
         if settings.regulate == "estimate":
-            self._estimator = ForceEstimator(adapter, batch.count, batch.threads, learns=False)
+            self._estimator, self._arrays = ForceEstimator(adapter, batch, learns=False), batch.kernel_arrays
 
     def sample_feasible(
         self,
         robots: Sequence[int],
         generators: Sequence[np.random.Generator],
-        imperfections: Sequence[Imperfections | None],
+        imperfections: Imperfections | None,
         drawn: Sequence[Drawn],
     ) -> tuple[np.ndarray, list[Assignment]]:
         """Return a feasible assignment for each of some robots, sampled by a generator of its own.
@@ -75,81 +79,74 @@ class Trials:
             TypeError: If the task samples something other than an :class:`Assignment`.
             ValueError: If it samples an invalid scene or set-point.
         """
-        desired = np.zeros((len(robots), self._adapter.space if self._task.force_vector else 1))
-        assignments: dict[int, Assignment] = {}
+        task, batch, split = self._task, self._batch, self._split
+        desired = np.zeros((len(robots), self._adapter.space if task.force_vector else 1))
+        ratios = np.ones(len(robots)) if imperfections is None else imperfections.number("rigidity_ratio")
+        assignments: list[Any] = [None] * len(robots)
         waiting = list(range(len(robots)))
         for _ in range(MAX_SAMPLES):
-            own = {k: drawn[k].robot or self._batch.robot for k in waiting}
-            sampled = {k: _sample_split(self._task, own[k], generators[k], self._split) for k in waiting}
-            clear = [k for k in waiting if self._batch.assign_if_clear(robots[k], sampled[k].scene, drawn[k].robot)]
+            clear = []
+            for k in waiting:
+                own = drawn[k].robot
+                assignments[k] = _sample_split(task, own or batch.robot, generators[k], split)
+                if batch.assign_if_clear(robots[k], assignments[k].scene, own):
+                    clear.append(k)
             if not clear:
                 continue
             found, forces = self._pull(
-                [robots[k] for k in clear], [sampled[k] for k in clear], [imperfections[k] for k in clear]
+                [robots[k] for k in clear], [assignments[k] for k in clear], [drawn[k] for k in clear], ratios[clear]
             )
             desired[clear] = forces
-            assignments |= {k: sampled[k] for k in clear}
-            done = {k for k, success in zip(clear, found, strict=True) if success}
+            done = {k for k, success in zip(clear, found.tolist(), strict=True) if success}
             waiting = [k for k in waiting if k not in done]
             if not waiting:
-                return desired, [assignments[k] for k in range(len(robots))]
+                return desired, assignments
         raise RuntimeError(
             f"none of {MAX_SAMPLES} samples of {self._task} can be pushed as desired within {self._limit_mm:.6g} mm of "
             f"cable and the tension limit; {self._remedy}"
         )
 
     def _pull(
-        self, robots: list[int], assignments: list[Assignment], imperfections: list[Imperfections | None]
+        self, robots: list[int], assignments: list[Assignment], drawn: list[Drawn], ratios: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return whether trial pulls reach the set-points, ``(k,)`` bool, and the set-points, as sampled or reached."""
         forces = np.array([assignment.desired_force for assignment in assignments], float)
-        ratio = np.array([1.0 if entry is None else entry.rigidity_ratio for entry in imperfections])
         bending = np.array([assignment.direction for assignment in assignments], float)
-        pulls = self._adapter.actuation.cables_mm(self._adapter.actuation.steady(bending))
-        wanted, limit = forces * MARGIN / ratio, self._limit_mm
+        commands = self._adapter.actuation.steady(bending)
+        wanted = forces * MARGIN / ratios
         if self._estimator is not None:
-            found, reached = self._pull_by_estimate(robots, wanted, limit, bending)
+            found, reached = self._pull_by_estimate(robots, drawn, wanted, commands)
         else:
-            increment = PULL * self._adapter.scales.travel_mm
-            found, reached = self._batch.ramp_reaches_force(robots, wanted, increment, limit, pulls, self._task.target)
+            pulls = self._adapter.actuation.cables_mm(commands)
+            found, reached = self._batch.ramp_reaches_force(
+                robots, wanted, self._increment_mm, self._limit_mm, pulls, self._task.target
+            )
         if not self._task.force_vector:
             return found & (forces <= self._shown_n), forces[:, None]
-        goals = reached * (ratio / MARGIN)[:, None]
+        goals = reached * (ratios / MARGIN)[:, None]
         return found & (norm(goals) <= self._shown_n), goals
 
     def _pull_by_estimate(
-        self, robots: list[int], wanted: np.ndarray, limit: float, bending: np.ndarray
+        self, robots: list[int], drawn: list[Drawn], wanted: np.ndarray, commands: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return whether steady pulls bring the estimated forces to those wanted, and the forces they reach."""
-        batch, adapter, estimator = self._batch, self._adapter, self._estimator
+        batch, estimator = self._batch, self._estimator
         assert estimator is not None
         batch.rest(robots)
-        estimator.rest(robots, [batch.robot_of(robot) for robot in robots])
-        rows, pulled, lengths = np.array(robots), 0.0, adapter.layout.length(batch.blocks[robots])
-        found, reached = np.zeros(len(rows), bool), np.zeros((len(rows), adapter.space))
-        going = np.ones(len(rows), bool)
-        while going.any() and pulled < limit:
-            pulled = min(pulled + PULL * adapter.scales.travel_mm, limit)
-            moving = rows[going].tolist()
-            commands = pulled * adapter.actuation.steady(bending[going])
-            actuated = adapter.bounded(self._actuated(commands, lengths[going]))
-            adapter.write_command(batch.commands, actuated, moving)
-            batch.move(moving)
-            blocks = batch.blocks[moving]
-            tensions, onsets = adapter.layout.tensions(blocks), adapter.layout.onset(blocks)
-            estimator.update(moving, Measured(blocks, actuated, tensions, onsets))
-            forces = estimator.chosen[moving, None] * adapter.force(blocks, self._task.target)
-            reached[going] = forces
-            held = (norm(forces) >= wanted[going]) & (batch.statuses[moving] == Status.CONVERGED)
-            ended = held | (batch.statuses[moving] != Status.CONVERGED)
-            found[going] = held
-            going[going] = ~ended
-        return found, reached
-
-    def _actuated(self, commands: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """Return actuated coordinates with these commands and lengths, ``(k, actions)`` [mm]."""
-        spare = self._adapter.actions.size - commands.shape[1]
-        return np.concatenate([commands, lengths[:, :spare]], axis=1)
+        estimator.rest(robots, [own.robot for own in drawn], batch.blocks[as_slice(robots)])
+        reached = np.zeros((len(robots), self._adapter.space))
+        target = -1 if self._task.target is None else self._task.target
+        found = estimator.kernel.pulls_reach_forces(
+            self._arrays,
+            np.array(robots, np.int64),
+            wanted,
+            target,
+            commands,
+            self._increment_mm,
+            self._limit_mm,
+            reached,
+        )
+        return np.array(found, bool), reached
 
 
 def _limit_mm(settings: AnySettings, adapter: AnyAdapter) -> float:
@@ -196,6 +193,8 @@ def is_test_draw(generator: np.random.Generator) -> bool:
 
 def _check_sample(task: AnyTask, robot: AnyRobot, sampled: Assignment) -> None:
     """Raise an error if what a task, which may be a user's, has sampled is not a valid assignment."""
+    if _is_plain(task, robot, sampled):
+        return
     check_type("what the task samples", sampled, Assignment, "an Assignment")
     check_type("sampled scene", sampled.scene, Scene)
     if len(sampled.scene) != task.obstacles:
@@ -208,3 +207,15 @@ def _check_sample(task: AnyTask, robot: AnyRobot, sampled: Assignment) -> None:
             raise refusal("sampled profile", sampled.profile, "above 0 and at most 1 at every step")
     if sampled.motion is not None:
         check_array("sampled motion", sampled.motion, (PROFILE_STEPS, task.adapter.space))
+
+
+def _is_plain(task: AnyTask, robot: AnyRobot, sampled: Assignment) -> bool:
+    """Return whether an assignment is valid, without a profile or motion, by a look that takes less than all checks."""
+    if type(sampled) is not Assignment or sampled.profile is not None or sampled.motion is not None:
+        return False
+    scene, force, direction = sampled.scene, sampled.desired_force, sampled.direction
+    if type(scene) is not Scene or type(force) is not float or type(direction) is not tuple:
+        return False
+    low, high = force_bounds(Scales.of(robot).force_n)
+    numbers = len(direction) == task.adapter.space - 1 and all(type(n) is float and isfinite(n) for n in direction)
+    return numbers and len(scene.obstacles) == task.obstacles and low <= force <= high

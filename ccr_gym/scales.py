@@ -6,12 +6,15 @@ nothing in an environment is a number of millimetres or newtons: it is a multipl
 
 from typing import NamedTuple
 
+from solver import Robot
 from solver.common.robot import AnyRobot
 from solver.common.validation import check_instance
+from solver.spatial import SpatialRobot
 
 FORCE_SPAN = 10.0  # force on a robot of one section that is observed as 1 [EI/L²]
 TENSION_SPAN = 10.0  # tension of a robot of one section that is observed as 1 [EI/(aL)]
 RADIUS_SPAN = 1 / 9  # obstacle radius that is observed as 1 [L]
+ROBOTS = (Robot, SpatialRobot)
 AHEAD = (2, 4, 8)  # steps ahead at which a moving set-point is observed
 
 
@@ -37,6 +40,7 @@ class Scales(NamedTuple):
         Raises:
             TypeError: If it is no robot.
         """
-        check_instance("robot", robot, AnyRobot, "take a solver.Robot or solver.spatial.SpatialRobot")
+        if not isinstance(robot, ROBOTS):  # to look for all that a robot has takes longer than all else of a reset
+            check_instance("robot", robot, AnyRobot, "take a solver.Robot or solver.spatial.SpatialRobot")
         length, offset, rigidity = robot.length_mm, robot.offset_mm, robot.rigidity
         return cls(length, offset, rigidity / length / length, rigidity / offset / length)

@@ -5,24 +5,23 @@ natural units (:class:`ccr_gym.scales.Scales`).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from ccr_gym.actions import ActionSpec
 from ccr_gym.checks import check_fields, check_range, checked
-from ccr_gym.noise import correlated, draw_start, white
-from ccr_gym.quantities import EnvIndex
+from ccr_gym.noise import correlated, draw_start
 from ccr_gym.scales import Scales
 from ccr_gym.state import Arrays, put, take
-from solver import Transmission
+from solver.common.rows import as_slice
 from solver.common.validation import SMALLEST
 
 Range = tuple[float, ...]
 DELAYED_KEYS = ("force_error", "force_measured", "frames", "nodes")  # what a camera and a force sensor tell
-HISTORY = 8  # observations kept, more than the largest latency
+HISTORY = 8  # observations kept, as in the kernel; more than the largest latency
 MAX_LOSS, MAX_SIZE = 0.9, 1e6  # largest share of friction; largest play, noise or error [natural units]
 DEGREE = math.pi / 180
 NUMBERS = (
@@ -34,20 +33,9 @@ NUMBERS = (
     "force_noise",
     "force_resolution",
     "start",
-)  # of Imperfections, that are single numbers
-NUMBERS_OF = attrgetter(*NUMBERS)
-EPISODE = np.dtype([(name, int if name in ("latency", "start") else float) for name in NUMBERS])
-STATE = (
-    "_numbers",
-    "_motor_mm",
-    "_moved_in",
-    "_tension_zero",
-    "_force_bias",
-    "_pose_noise",
-    "_pose_error",
-    "_history",
-    "_history_empty",
-)  # arrays of a SensorModel
+)  # of Imperfections, that are single numbers, in the kernel's order
+LATENCY, RIGIDITY, START = map(NUMBERS.index, ("latency", "rigidity_ratio", "start"))
+SIGNED = "tension_zero", "force_bias"  # several numbers of an episode, of either sign, whose magnitudes are in a range
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,224 +115,156 @@ class Body(NamedTuple):
 
 
 class Imperfections(NamedTuple):
-    """The imperfections of one episode; those of :class:`Sensing`, in the units of the robot.
+    """The imperfections of k episodes; those of :class:`Sensing`, in the units of the robot.
 
     Attributes:
-        latency: Delay [steps].
-        backlash_mm: Play between motors and cables [mm].
-        rigidity_ratio: Rigidity over its nominal value.
-        tendon_loss: Share of the tension that is lost.
-        tension_noise: Standard deviation of the measured tensions [N].
-        tension_zero: Constant errors of the measured tensions, ``(c,)`` [N].
-        force_noise: Standard deviation of the measured force [N].
-        force_bias: Constant error of the measured force, ``(d,)`` [N].
-        force_resolution: What the measured force is a multiple of [N].
-        pose_noise: Standard deviations of places and turns of a disk, ``(d + turns,)`` [mm, rad].
-        pose_error: Constant errors of places and turns of all disks, ``(n + 1, d + turns)`` [mm, rad].
-        start: Where the white noise begins.
+        numbers: Those of :data:`NUMBERS`, ``(k, 8)``.
+        tension_zero: Constant errors of the measured tensions, ``(k, c)`` [N].
+        force_bias: Constant errors of the measured forces, ``(k, d)`` [N].
+        pose_noise: Standard deviations of places and turns of a disk, ``(k, d + turns)`` [mm, rad].
+        pose_error: Constant errors of places and turns of all disks, ``(k, n + 1, d + turns)`` [mm, rad].
     """
 
-    latency: int
-    backlash_mm: float
-    rigidity_ratio: float
-    tendon_loss: float
-    tension_noise: float
+    numbers: np.ndarray
     tension_zero: np.ndarray
-    force_noise: float
     force_bias: np.ndarray
-    force_resolution: float
     pose_noise: np.ndarray
     pose_error: np.ndarray
-    start: int
+
+    def number(self, name: str) -> np.ndarray:
+        """Return one of the numbers of each episode, ``(k,)``."""
+        return self.numbers[:, NUMBERS.index(name)]
 
 
-def sample_imperfections(sensing: Sensing, scales: Scales, body: Body, generator: np.random.Generator) -> Imperfections:
-    """Return the imperfections of an episode.
+class ImperfectionSampler:
+    """Samples the imperfections of episodes.
 
     Args:
         sensing: Ranges to sample from.
         scales: Natural units of the robot.
         body: Sizes of what is sensed.
-        generator: Generator of the environment.
     """
-    draws, length, tension, force = (
-        _Draws(generator, 11 + body.cables + body.space),
-        scales.length_mm,
-        scales.tension_n,
-        scales.force_n,
-    )
-    low, high = map(int, sensing.latency)
-    imperfections = Imperfections(
-        latency=draws.whole(low, high),
-        backlash_mm=draws.between(sensing.backlash) * scales.travel_mm,
-        rigidity_ratio=math.exp(draws.between(tuple(map(math.log, sensing.rigidity_ratio)))),
-        tendon_loss=draws.between(sensing.tendon_loss),
-        tension_noise=draws.between(sensing.tension_noise) * tension,
-        tension_zero=draws.signed(sensing.tension_zero, body.cables) * tension,
-        force_noise=draws.between(sensing.force_noise) * force,
-        force_bias=draws.signed(sensing.force_bias, body.space) * force,
-        force_resolution=draws.between(sensing.force_resolution) * force,
-        pose_noise=_pose_sizes(draws.between(sensing.place_noise) * length, draws.between(sensing.angle_noise), body),
-        pose_error=_pose_sizes(draws.between(sensing.place_error) * length, draws.between(sensing.angle_error), body)
-        * correlated(generator, body.nodes, body.space + body.turns),
-        start=draw_start(generator),
-    )
-    imperfections.pose_error[0] = 0.0  # the base is clamped where everybody knows it
-    return imperfections
 
+    def __init__(self, sensing: Sensing, scales: Scales, body: Body) -> None:
+        self._body, (self._least, most) = body, map(int, sensing.latency)
+        length, tension, force = scales.length_mm, scales.tension_n, scales.force_n
+        logarithms = tuple(map(math.log, sensing.rigidity_ratio))
+        drawn: dict[str, tuple[Range, float, int]] = {  # in the order of the draws: range, unit, and how many
+            "latency": ((0.0, float(most - self._least + 1)), 1.0, 1),
+            "backlash_mm": (sensing.backlash, scales.travel_mm, 1),
+            "rigidity_ratio": (logarithms, 1.0, 1),
+            "tendon_loss": (sensing.tendon_loss, 1.0, 1),
+            "tension_noise": (sensing.tension_noise, tension, 1),
+            "tension_zero": (sensing.tension_zero, tension, body.cables),
+            "force_noise": (sensing.force_noise, force, 1),
+            "force_bias": (sensing.force_bias, force, body.space),
+            "force_resolution": (sensing.force_resolution, force, 1),
+            "place_noise": (sensing.place_noise, length, 1),
+            "angle_noise": (sensing.angle_noise, 1.0, 1),
+            "place_error": (sensing.place_error, length, 1),
+            "angle_error": (sensing.angle_error, 1.0, 1),
+        }
+        ranges, units, counts = zip(*drawn.values(), strict=True)
+        low, high = np.repeat(np.array(ranges, float), counts, axis=0).T
+        self._low, self._spans, self._units = low, high - low, np.repeat(units, counts)
+        names = np.repeat(list(drawn), counts).tolist()
+        self._signed = np.array([name in SIGNED for name in names])
+        self._columns = {name: np.flatnonzero(np.array(names) == name) for name in SIGNED}
+        self._columns["numbers"] = np.array([names.index(name) for name in NUMBERS[:-1]])
+        for kind in ("noise", "error"):
+            place, angle = names.index(f"place_{kind}"), names.index(f"angle_{kind}")
+            self._columns[f"pose_{kind}"] = np.array([place] * body.space + [angle] * body.turns)
 
-class _Draws:
-    """Numbers from ranges, all drawn in one call of a generator."""
+    def sample(self, generators: Sequence[np.random.Generator]) -> Imperfections:
+        """Return the imperfections of episodes, each sampled by a generator of its own."""
+        body, values = self._body, self._spread([generator.random(len(self._low)) for generator in generators])
+        parts = {name: values[:, columns] for name, columns in self._columns.items()}
+        errors = correlated(generators, body.nodes, body.space + body.turns)
+        errors *= parts["pose_error"][:, None]
+        errors[:, 0] = 0.0  # the base is clamped where everybody knows it
+        numbers = np.empty((len(values), len(NUMBERS)))
+        numbers[:, :-1] = parts.pop("numbers")
+        numbers[:, LATENCY] = np.floor(numbers[:, LATENCY]) + self._least
+        numbers[:, RIGIDITY] = list(map(math.exp, numbers[:, RIGIDITY].tolist()))
+        numbers[:, START] = list(map(draw_start, generators))
+        return Imperfections(numbers, **parts | {"pose_error": errors})
 
-    def __init__(self, generator: np.random.Generator, count: int) -> None:
-        self._parts = iter(generator.random(count).tolist())
-
-    def whole(self, low: int, high: int) -> int:
-        return low + int(next(self._parts) * (high - low + 1))
-
-    def between(self, ends: Range) -> float:
-        low, high = ends
-        return float(low + next(self._parts) * (high - low))
-
-    def signed(self, ends: Range, count: int) -> np.ndarray:
-        """Return numbers of either sign whose magnitudes are from a range."""
-        sides = np.array([2 * next(self._parts) - 1 for _ in range(count)])
-        return np.asarray(np.copysign(ends[0] + np.abs(sides) * (ends[1] - ends[0]), sides))
-
-
-def _pose_sizes(place_mm: float, angle: float, body: Body) -> np.ndarray:
-    """Return the sizes of the errors of a disk's place and turns, ``(d + turns,)`` [mm, rad]."""
-    return np.array([place_mm] * body.space + [angle] * body.turns)
+    def _spread(self, drawn: list[np.ndarray]) -> np.ndarray:
+        """Return numbers in their ranges from numbers between 0 and 1, ``(k, draws)``."""
+        parts = np.array(drawn)
+        signs = 2 * parts - 1
+        values = self._low + np.where(self._signed, np.abs(signs), parts) * self._spans
+        return np.asarray(np.where(self._signed, np.copysign(values, signs), values) * self._units)
 
 
 class SensorModel:
-    """Motors and sensors of many robots.
+    """Motors and sensors of many robots; the kernel moves and reads them (``solver/native/transition/sensors.hpp``).
+
+    Attributes:
+        arrays: Their state, by name.
 
     Args:
         count: Number N of robots.
         body: Sizes of what is sensed.
         actions: The actuated coordinates.
-        delayed: Which columns of an observation are delayed, ``(k,)`` bool.
+        columns: Numbers of an observation.
     """
 
-    def __init__(self, count: int, body: Body, actions: ActionSpec, delayed: np.ndarray) -> None:
-        self._actions, self._delayed, self._body = actions, delayed, body
+    def __init__(self, count: int, body: Body, actions: ActionSpec, columns: int) -> None:
         self._has_backlash = np.arange(actions.size) < actions.commands  # cables have, the insertion has none
-        self._numbers = np.zeros(count, EPISODE)
-        self._numbers["rigidity_ratio"] = 1.0
-        self._motor_mm, self._moved_in = np.zeros((count, actions.size)), np.ones((count, body.cables), bool)
-        self._tension_zero, self._force_bias = np.zeros((count, body.cables)), np.zeros((count, body.space))
-        self._pose_noise = np.zeros((count, body.space + body.turns))
-        self._pose_error = np.zeros((count, body.nodes, body.space + body.turns))
-        self._white = body.cables + body.space + (body.nodes - 1) * (body.space + body.turns)  # numbers of a step
-        self._history = np.zeros((count, HISTORY, delayed.size))
-        self._history_empty = np.ones(count, bool)
+        self.arrays: Arrays = {
+            "numbers": np.zeros((count, len(NUMBERS))),
+            "motor_mm": np.zeros((count, actions.size)),
+            "moved_in": np.ones((count, body.cables), bool),
+            "tension_zero": np.zeros((count, body.cables)),
+            "force_bias": np.zeros((count, body.space)),
+            "pose_noise": np.zeros((count, body.space + body.turns)),
+            "pose_error": np.zeros((count, body.nodes, body.space + body.turns)),
+            "history": np.zeros((count, HISTORY, columns)),
+            "history_empty": np.ones(count, bool),
+        }
+        self._column("rigidity_ratio")[:] = 1.0
 
     @property
     def rigidity_ratio(self) -> np.ndarray:
         """Rigidity of each robot over its nominal value, ``(N,)``."""
-        return self._numbers["rigidity_ratio"]
+        return self._column("rigidity_ratio")
 
     @property
     def tendon_loss(self) -> np.ndarray:
         """Share of the tension that friction takes, ``(N,)``."""
-        return self._numbers["tendon_loss"]
+        return self._column("tendon_loss")
 
     @property
     def latency(self) -> np.ndarray:
         """Delay of shape and force sensor, ``(N,)`` [steps]."""
-        return self._numbers["latency"]
+        return self._column("latency").astype(int)
 
-    def begin_episode(self, robot: int, sampled: Imperfections, motor_mm: np.ndarray) -> None:
-        """Begin a robot's next episode, with the motors at these positions."""
-        self._numbers[robot] = NUMBERS_OF(sampled)
-        self._tension_zero[robot], self._force_bias[robot] = sampled.tension_zero, sampled.force_bias
-        self._pose_noise[robot], self._pose_error[robot] = sampled.pose_noise, sampled.pose_error
-        self._motor_mm[robot], self._moved_in[robot], self._history_empty[robot] = motor_mm, True, True
+    @property
+    def motor_mm(self) -> np.ndarray:
+        """Motor positions, as encoders read them, ``(N, actions)`` [mm]."""
+        return self.arrays["motor_mm"]
+
+    @property
+    def half_backlash_mm(self) -> np.ndarray:
+        """How far motors and actuated coordinates can be apart, ``(N, actions)`` [mm]."""
+        return self._column("backlash_mm")[:, None] / 2 * self._has_backlash
+
+    def _column(self, name: str) -> np.ndarray:
+        return self.arrays["numbers"][:, NUMBERS.index(name)]
+
+    def begin_episodes(self, robots: list[int], sampled: Imperfections, motor_mm: np.ndarray) -> None:
+        """Begin the next episodes of some robots, with the motors at positions ``(k, actions)``."""
+        at = as_slice(robots)
+        for name, rows in zip(Imperfections._fields, sampled, strict=True):
+            self.arrays[name][at] = rows
+        self.arrays["motor_mm"][at] = motor_mm
+        self.arrays["moved_in"][at] = self.arrays["history_empty"][at] = True
 
     def get_rows(self, robots: list[int]) -> Arrays:
         """Return the state of some robots."""
-        return take(self, STATE, robots)
+        return take(self.arrays, list(self.arrays), robots)
 
     def set_rows(self, robots: list[int], rows: Arrays) -> None:
         """Put robots into a state of :meth:`get_rows`."""
-        put(self, rows, robots)
-
-    def move_cables(self, before_mm: np.ndarray, after_mm: np.ndarray, index: EnvIndex) -> None:
-        """Note which way cables have moved, displacements ``(..., cables)`` [mm]."""
-        self._moved_in[index] = self._transmission(index).moved(before_mm, after_mm).moved_in
-
-    def motor_tensions(self, tensions: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return the tensions that the motors see for nominal ones in the robot, ``(..., cables)`` [N]."""
-        ratio = np.asarray(self.rigidity_ratio[index])[..., None]
-        return self._transmission(index).motor_tensions(ratio * tensions)
-
-    def _transmission(self, index: EnvIndex) -> Transmission:
-        return Transmission(np.asarray(self.tendon_loss[index]), self._moved_in[index])
-
-    def apply_backlash(self, actuated_mm: np.ndarray, increment_mm: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Move the motors by increments, within bounds, and return where that leaves the actuated coordinates [mm].
-
-        Args:
-            actuated_mm: Actuated coordinates, ``(..., actions)``, or ``(...,)`` for a single one [mm].
-            increment_mm: Increments of the motors, likewise [mm].
-            index: The robots.
-        """
-        low, high, motor_mm = self._actions.low_mm, self._actions.high_mm, self._motor_mm[index]
-        motor_mm = np.minimum(np.maximum(motor_mm + np.reshape(increment_mm, motor_mm.shape), low), high)
-        self._motor_mm[index] = motor_mm
-        half = self.half_backlash_mm(index)
-        moved = np.minimum(np.maximum(np.reshape(actuated_mm, motor_mm.shape), motor_mm - half), motor_mm + half)
-        return np.reshape(np.minimum(np.maximum(moved, low), high), np.shape(actuated_mm))
-
-    def motor_mm(self, index: EnvIndex) -> np.ndarray:
-        """Return the motor positions, as encoders read them, ``(..., actions)`` [mm]."""
-        return np.asarray(self._motor_mm[index])
-
-    def half_backlash_mm(self, index: EnvIndex) -> np.ndarray:
-        """Return how far motors and actuated coordinates can be apart, ``(..., actions)`` [mm]."""
-        return np.asarray(np.asarray(self._numbers["backlash_mm"][index])[..., None] / 2 * self._has_backlash)
-
-    def measured_tensions(self, tensions: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return what load cells at the motors read for nominal tensions in the robot, ``(..., c)`` [N]."""
-        noise = self._noise(time, index, 0, self._body.cables) * self._numbers["tension_noise"][index][..., None]
-        return np.asarray(self.motor_tensions(tensions, index) + self._tension_zero[index] + noise)
-
-    def measured_force(self, force: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return what the force sensor reads for forces ``(..., d)`` [N]: bias, noise, then steps of its resolution."""
-        noise = (
-            self._noise(time, index, self._body.cables, self._body.space)
-            * self._numbers["force_noise"][index][..., None]
-        )
-        read = force + self._force_bias[index] + noise
-        step = self._numbers["force_resolution"][index][..., None]
-        return np.asarray(np.where(step > 0, np.round(read / np.where(step > 0, step, 1.0)) * step, read))
-
-    def pose_errors(self, time: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return errors of the seen places and turns of all disks, ``(..., n + 1, d + turns)`` [mm, rad]."""
-        errors = self._pose_error[index].copy()
-        moving = errors[..., 1:, :]
-        first = self._body.cables + self._body.space
-        noise = self._noise(time, index, first, self._white - first).reshape(moving.shape)
-        moving += noise * self._pose_noise[index][..., None, :]
-        return np.asarray(errors)
-
-    def _noise(self, time: np.ndarray, index: EnvIndex, first: int, count: int) -> np.ndarray:
-        """Return some of the white noise of a step, of unit variance, ``(..., count)``."""
-        return white(np.asarray(self._numbers["start"][index] + time[index] * self._white + first), count)
-
-    def apply_latency(self, rows: np.ndarray, time: np.ndarray, index: EnvIndex) -> np.ndarray:
-        """Return observations whose delayed columns are those of earlier steps, of the first step at the beginning.
-
-        Args:
-            rows: Present observations, ``(..., k)``.
-            time: Step of each episode, ``(N,)``.
-            index: The robots.
-        """
-        robots = np.atleast_1d(np.arange(len(time))[index])
-        now, present, empty = time[robots], rows.reshape(len(robots), -1), self._history_empty[robots]
-        self._history[robots[empty]] = present[empty, None]
-        self._history_empty[robots] = False
-        self._history[robots, now % HISTORY] = present
-        earlier = self._history[robots, (now - self.latency[robots]) % HISTORY]
-        return np.where(self._delayed, earlier, present).reshape(rows.shape)
+        put(self.arrays, rows, robots)

@@ -48,11 +48,13 @@ def entry_of(observation: Observation, index: int) -> Observation:
 
 def masked(infos: Info, mask: np.ndarray) -> Info:
     """Return infos in Gymnasium's form: zero outside the mask, and the mask beside every entry."""
-    found: Info = {}
-    for key, value in infos.items():
-        if mask.all():
-            found[key] = value
-        else:
-            found[key] = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type())
-        found[f"_{key}"] = mask.copy()
-    return found
+    masks = np.empty((len(infos), len(mask)), bool)
+    masks[:] = mask
+    if not mask.all():
+        infos = {key: _zero_outside(value, mask) for key, value in infos.items()}
+    return infos | dict(zip((f"_{key}" for key in infos), masks, strict=True))
+
+
+def _zero_outside(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return values with those outside of a mask set to zero."""
+    return np.where(mask.reshape(-1, *[1] * (values.ndim - 1)), values, values.dtype.type())

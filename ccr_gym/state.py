@@ -1,9 +1,7 @@
 """States of environments, taken out and put back: planning on copies, forks, exact continuation elsewhere."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -58,22 +56,16 @@ class EnvState:
     ended: np.ndarray
 
 
-def take(owner: object, names: tuple[str, ...], robots: list[int]) -> Arrays:
-    """Return copies of the rows of arrays that are attributes of an object."""
-    return dict(zip(names, copies(_getter(names)(owner), as_slice(robots)), strict=True))
+def take(arrays: Arrays, names: Sequence[str], robots: list[int]) -> Arrays:
+    """Return copies of the rows of some arrays."""
+    return dict(zip(names, copies((arrays[name] for name in names), as_slice(robots)), strict=True))
 
 
-@cache
-def _getter(names: tuple[str, ...]) -> Callable[[object], tuple[Any, ...]]:
-    """Return what reads these attributes of an object; to make it takes as long as to use it."""
-    return attrgetter(*names)
-
-
-def put(owner: object, arrays: Arrays, robots: list[int]) -> None:
-    """Write rows of arrays that are attributes of an object."""
+def put(arrays: Arrays, rows: Arrays, robots: list[int]) -> None:
+    """Write rows of arrays."""
     at = as_slice(robots)
-    for name, rows in arrays.items():
-        getattr(owner, name)[at] = rows
+    for name, given in rows.items():
+        arrays[name][at] = given
 
 
 def check_state(state: object, generators: Sequence[np.random.Generator | None]) -> None:

@@ -37,8 +37,13 @@ def check_force(name: str, value: object, unit_n: float) -> float:
     Raises:
         ValueError: If it is not a number that the observation can show.
     """
-    low, high = LEAST_FORCE * unit_n, FORCE_SPAN * unit_n
+    low, high = force_bounds(unit_n)
     return check_number(name, value, low=low, high=high, reason="what the observation can show, in N")
+
+
+def force_bounds(unit_n: float) -> Range:
+    """Return the least and largest magnitude of a set-point that the observation can show, from EI/L² [N]."""
+    return LEAST_FORCE * unit_n, FORCE_SPAN * unit_n
 
 
 class Assignment(NamedTuple):

@@ -16,7 +16,7 @@ from ccr_gym.checks import check_flag, check_fractions, check_instance, check_nu
 from ccr_gym.scales import Scales
 from ccr_gym.task import PROFILE_STEPS, AnyTask, Assignment, Range, Task, check_force_range, uniform
 from solver import Circle, HalfPlane, Robot, Scene
-from solver.common.validation import SMALLEST, check_whole
+from solver.common.validation import SMALLEST, Point, check_whole
 from solver.spatial import Cylinder, SpatialRobot, Sphere
 
 PAPER_MM = 180.0  # length of the paper's robot
@@ -250,9 +250,9 @@ class SpatialPush(Task[SpatialRobot]):
             (-self.max_ramp_angle, self.max_ramp_angle),
             (0.0, 1.0),
         )
-        outward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        center = distance * outward + [0.0, 0.0, height]
-        across = np.array([-math.cos(tilt) * outward[1], math.cos(tilt) * outward[0], math.sin(tilt)])
+        x, y, level = math.cos(azimuth), math.sin(azimuth), math.cos(tilt)  # of directions: outward, and its tilt
+        center = distance * x, distance * y, height
+        across = -level * y, level * x, math.sin(tilt)
         make = _cylinder if kind < self.cylinder_fraction else _sphere
         towards = azimuth + ramp_angle if self.force_vector else azimuth
         scene = Scene([make(scales, center, radius, across)])
@@ -260,7 +260,7 @@ class SpatialPush(Task[SpatialRobot]):
 
     def narrowest_scenes(self, robot: SpatialRobot) -> Sequence[Scene]:
         """Return the smallest sphere and the smallest cylinder, if they can be sampled."""
-        center, across = np.array([self.distance[0], 0.0, self.height[0]]), np.array([0.0, 1.0, 0.0])
+        center, across = (self.distance[0], 0.0, self.height[0]), (0.0, 1.0, 0.0)
         sampled = (_sphere, self.cylinder_fraction < 1), (_cylinder, self.cylinder_fraction > 0)
         scales = Scales.of(robot)
         return [Scene([make(scales, center, self.radius[0], across)]) for make, possible in sampled if possible]
@@ -298,17 +298,19 @@ def _circle(scales: Scales, x: float, y: float, radius: float) -> Circle:
     return Circle(center=(x * length, y * length), radius=radius * length)
 
 
-def _sphere(scales: Scales, center: np.ndarray, radius: float, _: np.ndarray) -> Sphere:
+def _sphere(scales: Scales, center: Point, radius: float, _: Point) -> Sphere:
     """Return a sphere, given in multiples of L."""
     return Sphere(center=_point(scales, center), radius=radius * scales.length_mm)
 
 
-def _cylinder(scales: Scales, center: np.ndarray, radius: float, axis: np.ndarray) -> Cylinder:
+def _cylinder(scales: Scales, center: Point, radius: float, axis: Point) -> Cylinder:
     """Return a cylinder around a centre, given in multiples of L."""
-    start, end = (_point(scales, center + side * HALF_CYLINDER * axis) for side in (-1, 1))
+    halves = -HALF_CYLINDER, HALF_CYLINDER
+    start, end = (tuple(x + half * along for x, along in zip(center, axis, strict=True)) for half in halves)
     length = scales.length_mm
-    return Cylinder(start=start, end=end, radius=radius * length, edge=CYLINDER_EDGE * length)
+    edge = CYLINDER_EDGE * length
+    return Cylinder(start=_point(scales, start), end=_point(scales, end), radius=radius * length, edge=edge)
 
 
-def _point(scales: Scales, place: np.ndarray) -> tuple[float, ...]:
-    return tuple((place * scales.length_mm).tolist())
+def _point(scales: Scales, place: Point) -> Point:
+    return tuple(x * scales.length_mm for x in place)

@@ -11,15 +11,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from ccr_gym.actions import ActionSpec
-from ccr_gym.checks import as_array, check_array, check_choice, check_seed, check_type, refusal, require
+from ccr_gym.checks import as_array, check_array, check_choice, check_flag, check_seed, check_type, refusal, require
 from ccr_gym.contact_env import METADATA, Info, make_settings, single_spaces
+from ccr_gym.differentiation import DifferentiableSteps
 from ccr_gym.episodes import EpisodeBatch
 from ccr_gym.goals import compute_reward
 from ccr_gym.observation import Observation
 from ccr_gym.pictures import Pictures
-from ccr_gym.quantities import Quantity
 from ccr_gym.readings import PrivilegedState
-from ccr_gym.reward import TERMS
 from ccr_gym.shared import SharedAttributes, entry_of, masked
 from ccr_gym.state import EnvState, check_state, restored, state_of
 from ccr_gym.task import MAX_STEPS, AnyTask
@@ -28,10 +27,10 @@ from solver.common.validation import check_sequence, check_whole, is_listed
 
 MAX_ENVS = 65_536
 THREADS_PER_CORE = 4
-ARGUMENTS = ("task", "num_envs", "max_episode_steps", "autoreset_mode", "threads", "render_mode")
+ARGUMENTS = ("task", "num_envs", "max_episode_steps", "autoreset_mode", "threads", "render_mode", "derivatives")
 
 
-class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.ndarray]):
+class ContactVectorEnv(SharedAttributes, DifferentiableSteps, VectorEnv[Observation, np.ndarray, np.ndarray]):
     """Many :class:`ccr_gym.ContactEnv` of one task, moved by one call of the solver.
 
     Results are bit-identical to those of ``gymnasium.vector.SyncVectorEnv``, for any number of threads.
@@ -44,6 +43,7 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
             the last step (``"SameStep"``), or by the caller (``"Disabled"``).
         threads: Threads of the solver, up to four per core.
         render_mode: ``None``, or ``"rgb_array"`` for pictures of all environments.
+        derivatives: Whether steps are differentiated, for :attr:`slopes` and :meth:`vjp`.
         **settings: Fields of the task's settings, as :class:`ccr_gym.Settings`.
 
     Raises:
@@ -59,6 +59,7 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
         render_mode: str | None = None,
+        derivatives: bool = False,
         **settings: object,
     ) -> None:
         if render_mode is not None:
@@ -73,7 +74,8 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         self.max_episode_steps = check_whole("max_episode_steps", steps, 1, MAX_STEPS)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
-        self._episodes = EpisodeBatch(task, self.settings, num_envs, threads)
+        derivatives = check_flag("derivatives", derivatives)
+        self._episodes = EpisodeBatch(task, self.settings, num_envs, threads, derivatives=derivatives)
         self.single_observation_space, self.single_action_space = single_spaces(self._episodes, self.settings)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -111,10 +113,7 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         self._generators = generators
         self._started = True
         self._film(np.flatnonzero(mask).tolist(), None)
-        reading = self._episodes.read()
-        terms = tuple(np.zeros((len(TERMS), self.num_envs)))
-        rows = self._episodes.observe(reading)
-        return self._episodes.shaped(rows, reading), masked(self._episodes.infos(reading, terms), mask)
+        return self._episodes.observation(), masked(self._episodes.infos(), mask)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
         """Move the cables, and reset environments as the autoreset mode says.
@@ -126,26 +125,21 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         disabled = self.autoreset_mode is AutoresetMode.DISABLED
         if not self._started or (disabled and self._ended.any()):
             raise gymnasium.error.ResetNeeded("call reset() before step(), with a reset_mask after the end of episodes")
-        clipped = self._episodes.adapter.clip(check_array("actions", actions, self._shape))
-        resetting, everything = self._ended.copy(), np.ones(self.num_envs, bool)
-        self._move(clipped, resetting)
-        self._steps += ~resetting
-        reading = self._episodes.read()
-        terms = self._episodes.rewards(reading)
-        for term in terms:
-            term[resetting] = 0.0
+        checked = check_array("actions", actions, self._shape)
+        resetting = self._ended.copy()
+        self._move(checked, resetting)
         truncated = self._steps >= self.max_episode_steps
-        rewards = self._episodes.total_reward(reading, terms)
+        rewards = self._episodes.rewards()
         rewards[resetting] = 0.0
-        observation = self._episodes.shaped(self._episodes.observe(reading), reading)
-        infos = self._episodes.infos(reading, terms)
+        observation, infos = self._episodes.observation(), self._episodes.infos()
         self._ended, started = truncated.copy(), resetting
         if self.autoreset_mode is AutoresetMode.SAME_STEP and truncated.any():
-            observation, infos = self._restart(truncated, observation, infos, terms)
+            observation, infos = self._restart(truncated, observation, infos)
             started = truncated
         else:
-            infos = masked(infos, everything)
-        self._film(np.flatnonzero(started).tolist(), rewards)
+            infos = masked(infos, np.ones(self.num_envs, bool))
+        if self.render_mode is not None:
+            self._film(np.flatnonzero(started).tolist(), rewards)
         return observation, rewards, np.zeros(self.num_envs, bool), truncated, infos
 
     def get_state(self) -> EnvState:
@@ -279,18 +273,18 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         require(self._started or bool(mask.all()), "reset_mask is not all true; the first reset must be of all")
         return mask
 
-    def _move(self, actions: Quantity, resetting: np.ndarray) -> None:
+    def _move(self, actions: np.ndarray, resetting: np.ndarray) -> None:
         """Reset some environments and step the others."""
         if not resetting.any():
             self._episodes.step(actions)
+            self._steps += 1
             return
         self._start(np.flatnonzero(resetting), self._generators)  # first: if it raises, nothing has moved
         moving = np.flatnonzero(~resetting)
-        self._episodes.step(actions[moving], moving.tolist())
+        self._episodes.step(actions[moving], moving)
+        self._steps[moving] += 1
 
-    def _restart(
-        self, ended: np.ndarray, observation: Observation, infos: Info, terms: tuple[np.ndarray, ...]
-    ) -> tuple[Observation, Info]:
+    def _restart(self, ended: np.ndarray, observation: Observation, infos: Info) -> tuple[Observation, Info]:
         """Start new episodes where some have ended, whose last observation and info go into the info."""
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
@@ -299,10 +293,8 @@ class ContactVectorEnv(SharedAttributes, VectorEnv[Observation, np.ndarray, np.n
         final_infos["_final_info"] = ended.copy()
         self._start(np.flatnonzero(ended), self._generators)
         self._ended = np.zeros(self.num_envs, bool)
-        reading, everything = self._episodes.read(), np.ones(self.num_envs, bool)
-        terms = tuple(np.where(ended, 0.0, term) for term in terms)
-        restarted = self._episodes.shaped(self._episodes.observe(reading), reading)
-        return restarted, masked(self._episodes.infos(reading, terms), everything) | final_infos
+        everything = np.ones(self.num_envs, bool)
+        return self._episodes.observation(), masked(self._episodes.infos(), everything) | final_infos
 
     def _start(self, robots: np.ndarray, generators: list[np.random.Generator | None]) -> None:
         indices = robots.tolist()

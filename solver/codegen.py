@@ -10,6 +10,7 @@ for name in ("solver", "solver.spatial"):  # whose __init__ needs the kernel, wh
     sys.modules[name] = package = ModuleType(name)
     package.__path__ = [str(Path(__file__).parent.joinpath(*name.split(".")[1:]))]
 
+from solver.common import transition_laws  # noqa: E402
 from solver.common.gap_laws import clearance_function, gap_function, growth_function  # noqa: E402
 from solver.planar import formulation as planar  # noqa: E402
 from solver.spatial import arc  # noqa: E402
@@ -42,3 +43,4 @@ if __name__ == "__main__":
     ]
     round_kinds = planar.CIRCLE, planar.ELLIPSE, planar.CAPSULE, spatial.SPHERE, spatial.CAPSULE
     generate("slope_laws", [*in_inputs, *map(growth_function, round_kinds)], folder)
+    generate("transition_laws", transition_laws.functions(), folder)

@@ -149,6 +149,10 @@ GOOD = {
     "ccr_gym.ContactEnv": {"task": ccr_gym.LoadCell()},
     "ccr_gym.ContactVectorEnv": {"task": ccr_gym.LoadCell()},
     "ccr_gym.make_vector_env": {"task_name": "LoadCell"},
+    "agents.DifferentiableVectorEnv": {
+        "env": ccr_gym.make_vector_env("LoadCell", derivatives=True),
+        "dtype": torch.float64,
+    },
     "agents.ForceController": {},
     "agents.HarmonicController": {},
     "agents.LearnedPolicy": {"path": Path("nowhere")},
@@ -192,7 +196,7 @@ UNCHECKED = {
     *("solver.RigidityFit", "solver.Sensitivity", "solver.Status", "solver.Trace", "solver.Transmission"),
     *("solver.Obstacle", "solver.held_signals", "solver.spatial.SpatialObstacle", "solver.spatial.SpatialSensitivity"),
     *("ccr_gym.ActionSpec", "ccr_gym.Assignment", "ccr_gym.PrivilegedState", "ccr_gym.Scales", "ccr_gym.Task"),
-    *("ccr_gym.register_envs", "ccr_gym.check_packages"),
+    *("ccr_gym.register_envs", "ccr_gym.check_packages", "ccr_gym.StepSlopes", "ccr_gym.StepSlopes.make"),
     *("agents.Episode", "agents.Knowledge", "agents.Metrics", "agents.Observation", "agents.Policy"),
 }
 

@@ -15,13 +15,12 @@ from agents.tuned import NEWTON_GAIN
 from ccr_gym import ActionSpec, PrivilegedState, Scales
 
 CLOSER = 0.5  # share of the missing force that a Newton step may leave
-PROBE = 1e-4  # trial move of a finite difference [a]
 REACHED = 1e-9  # force error that is roundoff, for which no motor crosses its backlash [EI/L²]
 
 
 @dataclass(slots=True)
 class NewtonController:
-    """Newton steps on the slopes of the contact force in the actuated displacements, from trial moves that are solved.
+    """Newton steps on the exact slopes of the contact force in the actuated displacements.
 
     It knows the model, the scene and the state of the robot, which policies do not see, but neither rigidity nor
     backlash: these are what :class:`agents.estimation.robot.RobotEstimator` knows of them. The oracle sees all of
@@ -82,7 +81,7 @@ class NewtonController:
             state = self._estimated(observation, known)
         if not state.force.any():
             return search(observation)
-        slopes = self._slopes(known.actuated_mm, scales, float(np.linalg.norm(state.force)))
+        slopes = self._slopes(known, float(np.linalg.norm(state.force)), scales)
         if np.ndim(state.goal) == 0:  # a magnitude: only the component along the present force counts
             size = float(np.linalg.norm(state.force))
             slopes, missing = slopes @ (state.force / size)[:, None], np.array([state.goal - size])
@@ -144,17 +143,13 @@ class NewtonController:
         slack = np.where(np.arange(state.half_backlash_mm.size) < cables, known.half_backlash, 0.0)  # insertion: none
         return state._replace(force=force, rigidity_ratio=ratio, goal=goal, half_backlash_mm=slack)
 
-    def _slopes(self, actuated: np.ndarray, scales: Scales, size: float) -> np.ndarray:
+    def _slopes(self, known: PrivilegedState, size: float, scales: Scales) -> np.ndarray:
         """Return the slopes of the regulated force in the actuated displacements, ``(actions, d)`` [EI/L² per a].
 
         They are those of the contact force, times the ratio of the regulated force's magnitude to it.
         """
-        probe = self._env.get_wrapper_attr("probe")
-        high = self._actions.high_mm / scales.travel_mm
-        steps = np.where(actuated + PROBE > high, -PROBE, PROBE)
-        here = probe(actuated * scales.travel_mm)
-        there = np.array([probe(places * scales.travel_mm) for places in actuated + np.diag(steps)])
-        return np.asarray((there - here) / steps[:, None] * (size / max(float(np.linalg.norm(here)), REACHED)))
+        slopes = self._env.get_wrapper_attr("force_slopes")() * (scales.travel_mm / scales.force_n)
+        return np.asarray(slopes * (size / max(float(np.linalg.norm(known.force)), REACHED)))
 
 
 def closest(lacks: Callable[[float], float], farthest: float) -> float:

@@ -34,7 +34,6 @@ from agents.policy import motor_actions, natural, search
 from agents.tuned import DistilledSettings
 from ccr_gym import ActionSpec, Scales
 
-PROBE = 0.0025  # trial move that the slope of the force is measured with [a]
 LEAST_SLOPE = 0.05  # smallest slope that is used [EI/L² per a]
 REACHED = 1e-4  # force error below which the teacher rests [EI/L²]
 
@@ -42,32 +41,26 @@ REACHED = 1e-4  # force error below which the teacher rests [EI/L²]
 def teacher_actions(envs: VecEnv, observation: Observation) -> np.ndarray:
     """Return the actions ``(N, actions)`` of a controller that sees the true force, its slope, backlash and set-point.
 
-    They are Newton steps to the next set-point, with the slope from a trial move of the robots in their present state;
-    before contact, full speed towards the obstacle. All cables move in the direction of the search; an insertion stays
-    where it is.
+    They are Newton steps to the next set-point, with the exact slope; before contact, full speed towards the obstacle.
+    All cables move in the direction of the search; an insertion stays where it is.
     """
     scales: Scales = envs.get_attr("settings", [0])[0].scales
     state = natural(envs.get_attr("privileged_state", [0])[0], scales)
     spec: ActionSpec = envs.get_attr("action_spec", [0])[0]
     direction = search(observation).astype(float)
     force = np.linalg.norm(state.force, axis=1)
-    slope = np.maximum(np.abs(_slopes(envs, state.actuated_mm, direction, force, scales)), LEAST_SLOPE)
+    slope = np.maximum(np.abs(_slopes(envs, state.force, direction, scales)), LEAST_SLOPE)
     missing = np.where(np.abs(state.goal - force) < REACHED, 0.0, state.goal - force)
     moves = (missing / slope)[:, None] * direction
     actions = motor_actions(moves, state, spec.increment_mm / scales.travel_mm)
     return np.where(force[:, None] > 0, actions, direction.astype(np.float32))
 
 
-def _slopes(envs: VecEnv, actuated: np.ndarray, direction: np.ndarray, force: np.ndarray, scales: Scales) -> np.ndarray:
-    """Return the slopes of the regulated forces' magnitudes along a direction, ``(N,)`` [EI/L² per a].
-
-    They are those of the contact forces, times the ratios of the regulated forces to them.
-    """
-    here, there = (
-        np.linalg.norm(envs.env_method("probe", places * scales.travel_mm, indices=[0])[0], axis=1)
-        for places in (actuated, actuated + PROBE * direction)
-    )
-    return np.asarray((there - here) / PROBE * np.divide(force, here, out=np.ones(len(here)), where=here > 0))
+def _slopes(envs: VecEnv, force: np.ndarray, direction: np.ndarray, scales: Scales) -> np.ndarray:
+    """Return the slopes of the magnitudes of regulated forces ``(N, d)`` along a direction, ``(N,)`` [EI/L² per a]."""
+    slopes = envs.env_method("force_slopes", indices=[0])[0] * (scales.travel_mm / scales.force_n)
+    along, size = np.einsum("nk,nkd->nd", direction, slopes), np.linalg.norm(force, axis=1)
+    return np.asarray(np.divide(np.sum(along * force, axis=1), size, out=np.zeros(len(size)), where=size > 0))
 
 
 class Student:

@@ -70,7 +70,8 @@ class TransitionMemo(Generic[StateT, Command]):
 
     Args:
         solver: Solves the steps that are not in the memo.
-        capacity: Steps to keep, about 3 kB each; the least recently used is dropped first.
+        capacity: Steps to keep, the least recently used is dropped first; a step takes about twice the memory of a
+            block, 5 kB for a planar robot of 18 segments beside one obstacle.
 
     Raises:
         ValueError: If ``capacity`` is not a positive whole number.

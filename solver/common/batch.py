@@ -1,10 +1,9 @@
 """Base class of batches: many robots of one layout, each in its own scene, moved by one call of the kernel."""
 
-import math
 import os
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from solver.common.equilibrium import BaseEquilibrium, RobotT_co
 from solver.common.geometry import UnstressedRobot
 from solver.common.layout import Layout
 from solver.common.robot import AnyRobot
-from solver.common.rows import RowBatch
+from solver.common.rows import RowBatch, as_slice
 from solver.common.scene import MAX_OBSTACLES, Scene
 from solver.common.status import Status
 from solver.common.validation import (
@@ -28,6 +27,7 @@ from solver.common.validation import (
 EquilibriumT_co = TypeVar("EquilibriumT_co", bound=BaseEquilibrium[AnyRobot], covariant=True)
 
 MAX_PULL_STEPS = 100_000  # of a trial pull
+GAVE_UP = int(Status.GAVE_UP)  # comparisons with a member of an enumeration take longer
 
 
 class RobotBatch(MoveBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
@@ -70,6 +70,7 @@ class RobotBatch(MoveBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         self._work = self.statuses, self.iterations, self.factorizations
         self._unstressed = self._make_unstressed(robot)
         self._last_unstressed = self._unstressed  # of the last robot that was put among obstacles
+        self._last_made: tuple[Any, Any] = (None, None)  # the last one that is not the batch's, as the kernel takes it
 
     @abstractmethod
     def _make_layout(self, robot: Any, obstacles: int) -> Layout:
@@ -117,33 +118,18 @@ class RobotBatch(MoveBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         if (own, scene) == (self._robots[index], self._scenes[index]):
             return True
         changes = own != self._robots[index]
-        if changes and own is not None:
+        if changes and own is not None and own is not self._last_made[0]:
             self._check_own(own)
         robot = own or self.robot
         compiled = self._compile(robot, scene)
-        if not self._unstressed_of(robot).is_clear_of(scene):
+        if len(scene) and not self._unstressed_of(robot).is_clear_of(scene):
             return False
-        made = self._kernel_robot(own) if changes and own is not None else None
+        made = self._made(own) if changes and own is not None else None
         with self._exclusive:
             self._put(index, scene, compiled)
             self._become(index, own, made)
             self._unrested.add(index)
         return True
-
-    def assign_alike(self, index: int, other: Self) -> None:
-        """Assign the scene and the robot at an index of another batch of an equal robot, as :meth:`assign`, but faster.
-
-        Raises:
-            ValueError: If there is no scene, and as :meth:`assign`.
-            TypeError: If ``other`` is not a batch.
-        """
-        check_instance("other", other, RobotBatch, "take a batch of equal robots")
-        scene, robot = other.scene(index), other.robot_of(index)
-        if robot != self.robot_of(index) or other.layout.obstacles != self.layout.obstacles:
-            return self.assign(index, scene, robot)
-        with self._exclusive:
-            self._put(self._check_index(index), scene, other._compiled[index])
-            self._unrested.add(index)
 
     def rest(self, robots: Sequence[int]) -> None:
         """Bring some robots to rest again, as ``rest()`` of their solver.
@@ -153,12 +139,15 @@ class RobotBatch(MoveBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
                 the motors of a robot cannot carry its loads, which then does not move, while the others are at rest.
         """
         indices = self._check_assigned(robots)
+        at = as_slice(indices)
         with self._exclusive:
             self._unrested.update(indices)
             self._rest(indices)
-            self.commands[indices] = self.blocks[indices, : self.cables + 1]  # cables and length
-            self._unrested.difference_update(index for index in indices if self.statuses[index] != Status.GAVE_UP)
-        for index in self._unrested.intersection(indices):
+            self.commands[at] = self.blocks[at, : self.cables + 1]  # cables and length
+            refused = np.array(indices)[self.statuses[at] == GAVE_UP].tolist()
+            self._unrested.difference_update(indices)
+            self._unrested.update(refused)
+        for index in refused:
             check_carried(self.robot_of(index), self.statuses[index])
 
     def step(
@@ -287,12 +276,12 @@ class RobotBatch(MoveBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
             ValueError: If a number or an index is out of range, an index is repeated, or a robot has no scene.
         """
         indices = self._check_assigned(robots)
-        count, most = len(indices), self._limits[indices, 1].min(initial=math.inf)
+        count, (lowest, highest, _) = len(indices), self._cable_bounds(indices)
         forces = check_array("forces", forces, (count,), 0.0, LARGEST, "finite and not negative")
-        limit = check_positive("limit_mm", limit_mm, high=most)
+        limit = check_positive("limit_mm", limit_mm, high=float(np.min(highest, initial=LARGEST)))
         increment = check_positive("increment_mm", increment_mm, limit / MAX_PULL_STEPS, LARGEST)
         given = np.ones((count, self.cables)) if directions is None else directions
-        least = 0.0 if (self._limits[indices, 0] == 0).any() else -1.0
+        least = 0.0 if np.any(np.equal(lowest, 0)) else -1.0
         given = check_array("directions", given, (count, self.cables), least, 1.0, f"from {least:g} to 1")
         target = -1 if obstacle is None else check_whole("obstacle", obstacle, 0, self.layout.obstacles - 1)
         reached = np.zeros((count, self.space))
@@ -325,6 +314,12 @@ class RobotBatch(MoveBatch[RobotT_co], Generic[RobotT_co, EquilibriumT_co]):
         if robot is not self._last_unstressed.robot:
             self._last_unstressed = self._make_unstressed(robot)
         return self._last_unstressed
+
+    def _made(self, robot: Any) -> Any:
+        """Return a robot as the kernel takes it, kept for the last one."""
+        if robot is not self._last_made[0]:
+            self._last_made = robot, self._kernel_robot(robot)
+        return self._last_made[1]
 
     def _make_unstressed(self, robot: Any) -> UnstressedRobot:
         return UnstressedRobot.of(robot, self._unstressed_points(robot))

@@ -1,6 +1,7 @@
 """Obstacles and rods as the kernel takes them."""
 
 import math
+from collections.abc import Sequence
 from typing import TypedDict
 
 import numpy as np
@@ -24,9 +25,9 @@ class KernelObstacle(TypedDict):
     radius: float
     min_curvature_radius: float
     inradius: float
-    outline: np.ndarray
-    touchable: np.ndarray
-    spring: np.ndarray
+    outline: np.ndarray | None
+    touchable: np.ndarray | None
+    spring: np.ndarray | None
     law: int
 
 
@@ -37,12 +38,14 @@ def kernel_obstacles(robot: AnyRobot, scene: Scene) -> list[KernelObstacle]:
         ValueError: If an obstacle names a node that the robot does not have.
         RuntimeError: If a custom shape cannot be compiled.
     """
-    parts = zip(scene, scene.laws, touchable_points(robot, scene), strict=True)
-    return [_kernel_obstacle(obstacle, law, touchable) for obstacle, law, touchable in parts]
+    touchable: Sequence[np.ndarray | None] = [None] * len(scene)
+    if any(obstacle.nodes is not None for obstacle in scene):
+        touchable = list(touchable_points(robot, scene))
+    return [_kernel_obstacle(*parts) for parts in zip(scene, scene.laws, touchable, strict=True)]
 
 
-def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> KernelObstacle:
-    extent = obstacle.extent
+def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray | None) -> KernelObstacle:
+    extent, surface = obstacle.extent, obstacle.surface
     return KernelObstacle(
         shape=SHAPES[law.kind],
         parameters=np.array(obstacle.parameters, dtype=float),
@@ -50,9 +53,9 @@ def _kernel_obstacle(obstacle: Obstacle, law: GapLaw, touchable: np.ndarray) -> 
         radius=extent.radius,
         min_curvature_radius=extent.min_curvature_radius,
         inradius=extent.inradius,
-        outline=np.ascontiguousarray(obstacle.surface),
+        outline=np.ascontiguousarray(surface) if len(surface) else None,
         touchable=touchable,
-        spring=obstacle.spring_matrix,
+        spring=None if obstacle.spring is None else obstacle.spring_matrix,
         law=function_address(gap_function(law)) if law.kind == "custom" else 0,
     )
 

@@ -1,11 +1,14 @@
-"""Operations whose bits do not depend on how many are done at once: scalar and array versions, and dot products."""
+"""Operations that formulas are written in: for numbers, for arrays, and for expressions; and dot products of arrays."""
 
+import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 Value = float | np.ndarray
+Number = Any  # a value, or an expression
 
 
 class Operations(NamedTuple):
@@ -15,15 +18,20 @@ class Operations(NamedTuple):
         minimum: Smaller of two values.
         maximum: Larger of two values.
         where: First value where a condition holds, else the second.
+        exp: Exponential.
+        sqrt: Square root.
     """
 
-    minimum: Callable[[Value, Value], Value]
-    maximum: Callable[[Value, Value], Value]
-    where: Callable[[bool | np.ndarray, Value, Value], Value]
+    minimum: Callable[[Number, Number], Number]
+    maximum: Callable[[Number, Number], Number]
+    where: Callable[[Number, Number, Number], Number]
+    exp: Callable[[Number], Number]
+    sqrt: Callable[[Number], Number]
 
 
-ARRAYS = Operations(np.minimum, np.maximum, np.where)
-NUMBERS = Operations(min, max, lambda condition, yes, no: yes if condition else no)
+ARRAYS = Operations(np.minimum, np.maximum, np.where, np.exp, np.sqrt)
+NUMBERS = Operations(min, max, lambda condition, yes, no: yes if condition else no, math.exp, math.sqrt)
+SYMBOLS = Operations(ca.fmin, ca.fmax, ca.if_else, ca.exp, ca.sqrt)  # of CasADi
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

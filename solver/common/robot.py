@@ -1,11 +1,13 @@
 """What robots of the plane and of space have in common, and the checks they share."""
 
 import math
-from collections.abc import Sequence, Sized
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable, Sequence, Sized
+from functools import lru_cache, wraps
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from solver.common.validation import SMALLEST, check_number, check_positive, check_sequence, check_whole, refusal
 
+T = TypeVar("T")
 RIGIDITIES = (1e-60, 1e60)  # that leave EI/L² and EI/2l0, and the squares of forces, normal numbers [N·mm²]
 OFFSETS = (1e-4, 10.0)  # over the longest length: nearer cables leave too few digits of their share
 LEAST_TENSION = 1e-6  # a limit of tension, over EI/(aL): the robot cannot bend below it
@@ -14,6 +16,22 @@ MODELS = ("paper", "rod")
 THICKEST = 0.9  # thickness of a disk, over the segment at its shortest
 THIRDS = 80  # of the range of angles in the search for the longest edge of a bent segment
 MAX_POINTS = 2**18  # that can touch, on all lines together
+
+
+def kept_for_robots(function: Callable[[Any], T]) -> Callable[[Any], T]:
+    """Keep what a function returns for robots; for the last one it is found without looking at its fields."""
+    found = lru_cache(maxsize=64)(function)
+    last: list[tuple[Any, Any]] = [(None, None)]
+
+    @wraps(function)
+    def find(robot: Any) -> Any:
+        known, value = last[0]
+        if known is not robot:
+            value = found(robot)
+            last[0] = robot, value
+        return value
+
+    return find
 
 
 @runtime_checkable

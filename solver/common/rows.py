@@ -15,7 +15,7 @@ from solver.common.robot import AnyRobot
 from solver.common.scene import Scene
 from solver.common.validation import check_instance, check_sequence, check_whole, shown
 
-Kernel = Any  # a batch or a scene of the kernel, whose classes for the plane and for space share no base
+Kernel = Any  # a batch, its arrays or a scene of the kernel, whose classes for the plane and for space share no base
 SIZES = ("model", "segments", "number of cables", "number of lines that can touch", "positions")
 NUMBERS = ("blocks", "statuses", "iterations", "factorizations", "commands")
 NUMBERS_OF = attrgetter(*NUMBERS)

@@ -29,7 +29,8 @@ class Scene:
     obstacles: tuple[Obstacle, ...]
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
-        if isinstance(obstacles, Obstacle) or not isinstance(obstacles, Iterable):
+        listed = type(obstacles) is list or type(obstacles) is tuple
+        if not listed and (isinstance(obstacles, Obstacle) or not isinstance(obstacles, Iterable)):
             raise TypeError(f"obstacles is {shown(obstacles)}; give a list of obstacles, [] for none")
         object.__setattr__(self, "obstacles", tuple(itertools.islice(obstacles, MAX_OBSTACLES + 1)))
         if len(self.obstacles) > MAX_OBSTACLES:
@@ -40,7 +41,7 @@ class Scene:
                     f"an entry of obstacles is {shown(obstacle)}; give a Circle, HalfPlane, Ellipse, Capsule, "
                     "Polygon or Custom, or in space one of solver.spatial"
                 )
-        if len({obstacle.space for obstacle in self.obstacles}) > 1:
+        if len(self.obstacles) > 1 and len({obstacle.space for obstacle in self.obstacles}) > 1:
             raise ValueError(
                 "obstacles has some of the plane and some of space; a scene holds either, solver's or solver.spatial's"
             )

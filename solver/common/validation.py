@@ -162,7 +162,10 @@ def check_spring(name: str, value: object, space: int) -> Matrix:
     Raises:
         ValueError: Naming the value and what it must be.
     """
-    matrix = np.diag([check_positive(name, value)] * space) if is_real(value) else _check_matrix(name, value, space)
+    if is_real(value):
+        stiffness = check_positive(name, value)
+        return tuple(tuple(stiffness if row == column else 0.0 for column in range(space)) for row in range(space))
+    matrix = _check_matrix(name, value, space)
     size = np.abs(matrix).max()
     if not (SMALLEST <= size <= LARGEST and (matrix == matrix.T).all() and np.linalg.eigvalsh(matrix)[0] > 0):
         raise refusal(name, value, f"finite, symmetric and positive definite, at most {LARGEST:.6g}")
@@ -281,6 +284,8 @@ def _numbers_of(shape: Shape) -> str:
 
 def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
     """Return whether an array has a wanted shape, as described in :func:`check_numbers`."""
+    if shape == wanted:
+        return True
     if wanted[:1] == (...,):
         shape, wanted = shape[max(len(shape) - len(wanted) + 1, 0) :], wanted[1:]
     return len(shape) == len(wanted) and all(w in (-1, n) for n, w in zip(shape, wanted, strict=True))

@@ -61,27 +61,48 @@ class Batch {
   }
 
   const std::vector<Obstacle<D>>& scene(int robot) const { return scenes_[robot]; }
+  // Makes robots those of another batch, of equal robots, and puts them among the same obstacles.
+  void copy(const Batch& other, const std::vector<int>& robots) {
+    for (const int robot : robots) {
+      scenes_[robot] = other.scenes_[robot];
+      robots_[robot] = other.robots_[robot] == other.robot_ ? robot_ : other.robots_[robot];
+    }
+    std::fill(present_.begin(), present_.end(), nullptr);
+  }
 
-  // Calls `work` with a continuation among the obstacles of each of these robots, and its index in the list, until
-  // `stop` returns true. It is called in the calling thread only, between robots and amid their steps.
+  int threads() const { return static_cast<int>(workers_.size()); }
+
+  // The continuation of a thread in the place of a robot.
+  Continuation<D>& at(int thread, int robot) {
+    place(thread, robot);
+    return *workers_[thread];
+  }
+
+  // Lets the calls of another batch, within whose work this one is used, say when to end.
+  void set_leader(Batch* leader) { leader_ = leader; }
+
+  // Calls `work` with a thread and the index in the list of each of these robots, until `stop` returns true. It is
+  // called in the calling thread only, between robots and amid their steps.
   template <class Work, class Stop>
-  void each(const std::vector<int>& robots, Work work, Stop&& stop) {
+  void share(const std::vector<int>& robots, Work work, Stop&& stop) {
     stop_ = std::ref(stop);
     stopped_ = false;
     std::atomic<int> next = 0;
     const int count = static_cast<int>(robots.size());
     const auto run = [&](int thread) {
-      Continuation<D>& worker = *workers_[thread];
       for (int first; !stopped_ && (first = next.fetch_add(kChunk)) < count;) {
-        for (int k = first; k < std::min(first + kChunk, count) && !stopped_; ++k) {
-          place(thread, robots[k]);
-          work(worker, k);
-        }
+        for (int k = first; k < std::min(first + kChunk, count) && !stopped_; ++k) work(thread, k);
         if (thread == 0) is_stopped(0);
       }
     };
     if (workers_.size() == 1 || count <= kAlone) return run(0);
     pool_.run(std::ref(run), [this] { is_stopped(0); });  // a function that owned it would be allocated
+  }
+
+  // Calls `work` with a continuation among the obstacles of each robot instead.
+  template <class Work, class Stop>
+  void each(const std::vector<int>& robots, Work work, Stop&& stop) {
+    share(robots, [&](int thread, int k) { work(at(thread, robots[k]), k); }, stop);
   }
 
   template <class Work>
@@ -104,6 +125,7 @@ class Batch {
 
   // Whether the call under way is to end. The calling thread asks; the others wake it to do so.
   bool is_stopped(int thread) {
+    if (leader_) return leader_->is_stopped(thread);
     if (thread > 0)
       pool_.beat();
     else if (!stopped_)
@@ -117,6 +139,7 @@ class Batch {
   std::vector<std::shared_ptr<const Robot>> robots_;
   std::vector<const Robot*> present_;  // of each worker; null where it is to be set again
   std::vector<std::unique_ptr<Continuation<D>>> workers_;
+  Batch* leader_ = nullptr;
   std::function<bool()> stop_;  // of the call under way
   std::atomic<bool> stopped_ = false;
   Pool pool_;

@@ -156,6 +156,19 @@ void set_obstacles(Batch<D>& batch, int robot, std::vector<Obstacle<D>> obstacle
   batch.set_obstacles(robot, std::move(obstacles));
 }
 
+// Makes robots those of another batch of equal robots, and puts them among the same obstacles.
+template <int D>
+void copy(Batch<D>& batch, Batch<D>& other, const std::vector<int>& robots) {
+  const typename Batch<D>::Lock lock(batch), others(other);
+  require(&batch != &other && batch.obstacles() == other.obstacles() && batch.layout().size == other.layout().size,
+          "the batches must be two, of equal robots among as many obstacles");
+  for (const int robot : robots) {
+    require_index(batch, robot);
+    require_index(other, robot);
+  }
+  batch.copy(other, robots);
+}
+
 // Makes a robot another one with a block of the same fields; null for the batch's.
 template <int D>
 void set_robot(Batch<D>& batch, int index, const Robot* robot) {

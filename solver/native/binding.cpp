@@ -13,6 +13,7 @@
 #include "batch_calls.hpp"
 #include "kernel.hpp"
 #include "kernel_input.hpp"
+#include "transition_binding.hpp"
 
 using namespace nanobind::literals;
 
@@ -65,6 +66,8 @@ void bind_batch(nb::module_& m, const char* name) {
            "Put a robot among other obstacles. Its block stays as it is.")
       .def("set_robot", &set_robot<D>, "index"_a, "robot"_a.none(),
            "Make a robot another one with a block of the same fields; None for that of the batch. Its block stays.")
+      .def("copy", &copy<D>, "other"_a, "robots"_a,
+           "Make robots those of another batch of equal robots, and put them among the same obstacles. Blocks stay.")
       .def("rest", &rest<D>, "robots"_a, "lengths"_a, "blocks"_a, "statuses"_a, "iterations"_a, "factorizations"_a,
            "Bring some robots to rest, each at its length, in place.")
       .def(
@@ -100,13 +103,13 @@ void bind_space(nb::module_& m, const Names& names) {
       .def(
           "__init__",
           [](Obstacle<D>* self, Shape shape, const Input& parameters, const Numbers<D>& center, double radius,
-             double min_curvature_radius, double inradius, const Input& outline, const Mask& touchable,
-             const Input& spring, std::uintptr_t law) {
+             double min_curvature_radius, double inradius, const std::optional<Input>& outline,
+             const std::optional<Mask>& touchable, const std::optional<Input>& spring, std::uintptr_t law) {
             new (self) Obstacle<D>(make_obstacle<D>(shape, parameters, center, radius, min_curvature_radius, inradius,
                                                     outline, touchable, spring, law));
           },
           nb::kw_only(), "shape"_a, "parameters"_a, "center"_a, "radius"_a, "min_curvature_radius"_a, "inradius"_a,
-          "outline"_a, "touchable"_a, "spring"_a, "law"_a);
+          "outline"_a.none(), "touchable"_a.none(), "spring"_a.none(), "law"_a);
   bind_kernel<D>(m, names.kernel);
   bind_batch<D>(m, names.batch);
 }
@@ -212,4 +215,5 @@ NB_MODULE(_kernel, m) {
   bind_robot(m);
   bind_space<2>(m, {"measure_gaps", "Obstacle", "Kernel", "Batch"});
   bind_space<3>(m, {"measure_spatial_gaps", "SpatialObstacle", "SpatialKernel", "SpatialBatch"});
+  bind_transitions(m);
 }

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -109,10 +110,12 @@ inline std::array<double, kShapeSize> shape_parameters(const Input& parameters) 
 
 template <int D>
 Obstacle<D> make_obstacle(Shape shape, const Input& parameters, const Numbers<D>& center, double radius,
-                          double min_curvature_radius, double inradius, const Input& outline, const Mask& touchable,
-                          const Input& spring, std::uintptr_t law) {
-  require(spring.size() == D * D && outline.size() % D == 0, "spring is (d, d), outline (k, d)");
-  const bool *first = touchable.data(), *last = first + touchable.size();
+                          double min_curvature_radius, double inradius, const std::optional<Input>& outline,
+                          const std::optional<Mask>& touchable, const std::optional<Input>& spring,
+                          std::uintptr_t law) {
+  require((!spring || spring->size() == D * D) && (!outline || outline->size() % D == 0),
+          "spring is (d, d), outline (k, d)");
+  const bool *first = touchable ? touchable->data() : nullptr, *last = first + (touchable ? touchable->size() : 0);
   Obstacle<D> obstacle{.shape = shape,
                        .parameters = shape_parameters(parameters),
                        .law = reinterpret_cast<Law>(law),
@@ -123,18 +126,19 @@ Obstacle<D> make_obstacle(Shape shape, const Input& parameters, const Numbers<D>
                        .outline = {},
                        .touchable = {first, last},
                        .everywhere = std::find(first, last, false) == last,
-                       .mounted = spring.data()[0] > 0,
+                       .mounted = spring && spring->data()[0] > 0,
                        .spring = {}};
-  for (std::size_t k = 0; k < outline.size(); k += D) obstacle.outline.push_back(position<D>(outline.data() + k));
-  std::copy_n(spring.data(), D * D, obstacle.spring.v.begin());
+  for (std::size_t k = 0; outline && k < outline->size(); k += D)
+    obstacle.outline.push_back(position<D>(outline->data() + k));
+  if (spring) std::copy_n(spring->data(), D * D, obstacle.spring.v.begin());
   return obstacle;
 }
 
-// Refuses obstacles that do not say of each point of a robot whether it can touch them.
+// Refuses obstacles that do not say of each point of a robot whether it can touch them, unless all can.
 template <int D>
 void require_points(const BlockLayout& layout, const std::vector<Obstacle<D>>& obstacles) {
   for (const Obstacle<D>& obstacle : obstacles)
-    require(obstacle.touchable.size() == layout.flags.size,
+    require((obstacle.touchable.empty() && obstacle.everywhere) || obstacle.touchable.size() == layout.flags.size,
             "touchable must have an entry for each point of the robot, " + std::to_string(layout.flags.size));
 }
 

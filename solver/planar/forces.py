@@ -5,13 +5,13 @@ are different quantities. The energy force is that of the model itself. The virt
 and the free kinematics, contains no material constant, and is calibrated by an experiment through μ.
 """
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from solver.common.operations import NUMBERS, Operations, Value
+from solver.common.transition_laws import planar_work
 from solver.common.validation import (
     LARGEST,
     check_alike,
@@ -67,8 +67,8 @@ def virtual_work(
         for name, value in zip(VIRTUAL_WORK, (x, y, load, *given, offset_mm), strict=True)
     )
     check_alike(**{name: np.shape(value) for name, value in (("x", x), ("y", y), ("load", load), ("slopes", in_x))})
-    work = x * in_x + y * in_y
-    return offset * load * turn / operations.where(work < 0, work, -math.inf)
+    factor: Value = planar_work((x, y), offset * load, (in_x, in_y, turn), operations)
+    return factor
 
 
 def _check_value(name: str, value: object, operations: Operations) -> Value:

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +14,7 @@ from solver.common.robot import (
     check_model,
     check_point_count,
     check_proportions,
+    kept_for_robots,
     longest_arc_edge,
     widest_bend,
 )
@@ -242,14 +242,14 @@ class Robot:
         return min(math.pi * self.offset_mm, 0.5 * (self.shortest_mm if self.model == "paper" else self.longest_mm))
 
 
-@lru_cache(maxsize=64)
+@kept_for_robots
 def _lines(robot: Robot) -> tuple[float, ...]:
     cables = dict.fromkeys(math.copysign(cable.offset_mm or 0.0, cable.hole_mm[0]) for cable in full_cables(robot))
     distances = {"backbone": (0.0,), "cable": tuple(cables), "rim": (-robot.offset_mm,)}
     return tuple(dict.fromkeys(distance for line in robot.touch for distance in distances[line]))
 
 
-@lru_cache(maxsize=64)
+@kept_for_robots
 def _longest_edges(robot: Robot) -> tuple[float, ...]:
     segment = robot.longest_mm / robot.segments
     if robot.model == "rod":

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.common.operations import dot
+from solver.common.operations import ARRAYS
+from solver.common.transition_laws import slid, spatial_work
 from solver.common.validation import check_alike, check_finite, check_instance, check_numbers
 from solver.spatial.equilibrium import SpatialEquilibrium
 from solver.spatial.robot import sides
-
-TINY = 1e-300  # keeps quotients defined where nothing touches
 
 
 def force_true(equilibrium: SpatialEquilibrium) -> np.ndarray:
@@ -41,12 +40,7 @@ def with_friction(forces: np.ndarray, slopes: np.ndarray, friction: float) -> np
     forces, slopes = check_numbers("forces", forces, (..., 3)), check_numbers("slopes", slopes, (..., 2, 3))
     check_alike(forces=forces.shape[:-1], slopes=slopes.shape[:-2])
     friction = check_finite("friction", friction)
-    size = _norm(forces)
-    normal = forces / np.maximum(size, TINY)
-    against = -dot(normal[..., None, :], slopes)  # how each displacement moves the tip into the surface
-    motion = against[..., :1] * slopes[..., 0, :] + against[..., 1:] * slopes[..., 1, :]
-    slip = motion - dot(motion, normal)[..., None] * normal
-    return np.asarray(forces + friction * size * slip / np.maximum(_norm(slip), TINY))
+    return np.stack(slid(_components(forces), [*map(_components, _rows(slopes))], friction, ARRAYS), axis=-1)
 
 
 def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> np.ndarray:
@@ -65,10 +59,8 @@ def virtual_work(forces: np.ndarray, loads: np.ndarray, slopes: np.ndarray) -> n
     forces, loads = check_numbers("forces", forces, (..., 3)), check_numbers("loads", loads, (..., 2))
     slopes = check_numbers("slopes", slopes, (..., 2, 5))
     check_alike(forces=forces.shape[:-1], loads=loads.shape[:-1], slopes=slopes.shape[:-2])
-    works = dot(forces[..., None, :], slopes[..., :3])
-    given = dot(loads[..., None, :], slopes[..., 3:])
-    balance = dot(works, given)
-    return np.asarray(np.where(balance < 0, -balance, 0.0) / np.maximum(dot(works, works), TINY))
+    along = [*map(_components, _rows(slopes))]
+    return np.asarray(spatial_work(_components(forces), _components(loads), along, ARRAYS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,5 +98,11 @@ class SpatialVirtualWork:
         return np.asarray(virtual_work(forces.sum(axis=0), loads, slopes) * forces)
 
 
-def _norm(a: np.ndarray) -> np.ndarray:
-    return np.asarray(np.sqrt(dot(a, a))[..., None])
+def _components(vectors: np.ndarray) -> list[np.ndarray]:
+    """Return the components of vectors ``(..., k)``, k arrays ``(...)``."""
+    return list(np.moveaxis(vectors, -1, 0))
+
+
+def _rows(matrices: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of matrices ``(..., rows, k)``, arrays ``(..., k)``."""
+    return list(np.moveaxis(matrices, -2, 0))

@@ -173,8 +173,8 @@ class Cylinder(SpatialObstacle):
     def parameters(self) -> tuple[float, ...]:
         """Parameters (center, axis, radius and half-length of the core, edge radius) of the gap law."""
         center, half = _middle(self.start, self.end)
-        axis = np.subtract(self.end, self.start) / (2 * half)
-        return (*center, *axis.tolist(), self.radius - self.edge, half - self.edge, self.edge)
+        axis = ((b - a) / (2 * half) for a, b in zip(self.start, self.end, strict=True))
+        return (*center, *axis, self.radius - self.edge, half - self.edge, self.edge)
 
     @property
     def extent(self) -> Extent:
@@ -275,7 +275,7 @@ def _check_ends(start: Point, end: Point) -> None:
 
 def _middle(start: Point, end: Point) -> tuple[Point, float]:
     """Return the middle of a line segment and half its length."""
-    return tuple((np.add(start, end) / 2).tolist()), math.dist(start, end) / 2
+    return tuple((a + b) / 2 for a, b in zip(start, end, strict=True)), math.dist(start, end) / 2
 
 
 def _axes(axis: np.ndarray) -> np.ndarray:

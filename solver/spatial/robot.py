@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +14,7 @@ from solver.common.robot import (
     check_model,
     check_point_count,
     check_proportions,
+    kept_for_robots,
     longest_arc_edge,
     widest_bend,
 )
@@ -264,7 +264,7 @@ class SpatialRobot:
         return self.rigidity / (2 * self.segment_mm)
 
 
-@lru_cache(maxsize=64)
+@kept_for_robots
 def _lines(robot: SpatialRobot) -> np.ndarray:
     turns = 2 * math.pi / robot.rim_points * np.arange(robot.rim_points)
     positions = {
@@ -277,7 +277,7 @@ def _lines(robot: SpatialRobot) -> np.ndarray:
     return lines
 
 
-@lru_cache(maxsize=64)
+@kept_for_robots
 def _longest_edges(robot: SpatialRobot) -> tuple[float, ...]:
     segment = robot.segment_mm
     if robot.model == "rod":

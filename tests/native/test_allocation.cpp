@@ -7,6 +7,7 @@
 
 #include "batch.hpp"
 #include "scenes.hpp"
+#include "transitions.hpp"
 
 namespace {
 std::atomic<long> allocations = 0;
@@ -204,6 +205,28 @@ TEST_CASE("a batch's steps allocate nothing") { check_batch(false, false); }
 
 TEST_CASE("a batch's steps allocate nothing where its robots differ") {
   for (const bool rod : {false, true}) check_batch(rod, true);
+}
+
+TEST_CASE("steps of environments allocate nothing, estimates and observations included") {
+  for (const bool senses : {false, true}) {
+    Environments envs({0, 1, 2}, {.senses = senses});
+    const Memory rest = envs.memory;
+    const std::vector<int> which{0, 1, 2};
+    const std::vector<double> pull{0.9, -0.3, 0.8, -0.2, 0.7, -0.1}, release{-0.9, 0.3, -0.8, 0.2, -0.7, 0.1};
+    long allocated = 0;
+    int touching = 0;
+    for (int round = 0; round < 2; ++round) {
+      envs.memory.restore(rest);
+      const long before = allocations;
+      for (int step = 0; step < 24; ++step) {
+        envs.step(which, step < 12 ? pull : release);
+        touching += envs.readings.force_true[0][0] != 0;
+      }
+      allocated = allocations - before;
+    }
+    CHECK(allocated == 0);
+    CHECK(touching > 6);
+  }
 }
 
 }  // namespace

@@ -207,14 +207,12 @@ def test_scenes_are_assigned_where_they_leave_the_robot_clear():
 
 
 @pytest.mark.parametrize("kind", ["rod", "rod in space"])
-def test_robots_that_are_assigned_alike_move_alike(kind):
+def test_robots_that_are_copied_move_alike(kind):
     robots, scenes, pulls = family(kind, 8)
     first = batch_of(kind, robots, scenes, 1)
     second = type(first)(KINDS[kind], 8, 1)
     for _ in range(2):  # the second time only scenes change
-        for index in range(8):
-            second.assign_alike(index, first)
-        second.rest(range(8))
+        second.copy_rows(range(8), first)
         for row in pulls:
             commands = row[:, 0] if first.cables == 1 else row
             first.step(commands)
@@ -226,5 +224,41 @@ def test_robots_that_are_assigned_alike_move_alike(kind):
         for index, (robot, scene) in enumerate(zip(robots, scenes, strict=True)):
             first.assign(index, scene, robot)
         first.rest(range(8))
-    with pytest.raises(ValueError, match="robot 0 has no scene"):
-        second.assign_alike(0, type(first)(KINDS[kind], 8, 1))
+
+
+@pytest.mark.parametrize("kind", ["rod", "rod in space"])
+def test_rows_are_copied_from_another_batch(kind):
+    robots, scenes, pulls = family(kind, 8)
+    first = batch_of(kind, robots, scenes, 1)
+    second, expected = (batch_of(kind, robots[::-1], scenes[::-1], 1) for _ in range(2))
+    first.step(pulls[0][:, 0] if first.cables == 1 else pulls[0])
+    some = [6, 1, 3]
+    second.copy_rows(some, first)
+    expected.set_rows(some, first.get_rows(some))
+    for row in pulls[1:]:
+        commands = row[:, 0] if first.cables == 1 else row
+        for batch in (second, expected):
+            batch.step(commands)
+        for own, wanted in zip(second.get_rows(range(8)), expected.get_rows(range(8)), strict=True):
+            assert np.array_equal(own, wanted) if isinstance(own, np.ndarray) else own == wanted
+
+
+def test_rows_are_copied_from_batches_of_equal_robots_only():
+    robots, scenes, _ = family("rod", 8)
+    first, unrested = batch_of("rod", robots, scenes, 1), BatchSolver(KINDS["rod"], 8, 1)
+    unrested.assign(2, scenes[2])
+    for other, message in (
+        (BatchSolver(KINDS["rod"], 8, 2), "other is of another robot or number of obstacles"),
+        (BatchSolver(KINDS["paper"], 8, 1), "other is of another robot or number of obstacles"),
+        (BatchSolver(KINDS["rod"], 2, 1), "robot index is 2; it must be a whole number from 0 to 1"),
+    ):
+        before = first.get_rows(range(8))
+        with pytest.raises(ValueError, match=message):
+            first.copy_rows([2], other)
+        assert first.get_rows(range(8)).scenes == before.scenes
+    first.copy_rows([2, 5], unrested)
+    with pytest.raises(ValueError, match="robot 2 has a new scene"):
+        first.move([2])
+    with pytest.raises(ValueError, match="robot 5 has no scene"):
+        first.move([5])
+    first.move([0, 1, 3])

@@ -40,11 +40,12 @@ struct Obstacle {
   double min_curvature_radius;                // of the surface; infinite for a wall [mm]
   double inradius;                            // of the largest ball inside; infinite for a wall [mm]
   std::vector<Position<D>> outline;           // points of the surface, if the gap is not a distance [mm]
-  std::vector<unsigned char> touchable;       // whether each point of the robot can touch it
+  std::vector<unsigned char> touchable;       // whether each point of the robot can touch it; may be none if all can
   bool everywhere;                            // whether all points can
   bool mounted;                               // on a spring; otherwise fixed
   Mat<D, D> spring;                           // stiffness of the spring [N/mm]
 
+  bool can_touch(std::size_t point) const { return everywhere || touchable[point]; }
   bool wall() const { return shape == Shape::kHalfPlane || shape == Shape::kHalfSpace; }
 };
 

@@ -119,6 +119,14 @@ void ModelContinuation<Model>::write_block(double* block) {
 }
 
 template <class Model>
+void ModelContinuation<Model>::tip_slopes(const double* command, double* to) {
+  Command at = present_.command;
+  read(command, at.cables.v, layout_.cables.size);
+  at.length = command[layout_.cables.size];
+  write(problem_.free_slopes(at).v, to, layout_.tip_slopes.size);
+}
+
+template <class Model>
 void ModelContinuation<Model>::write_forces(double* block) const {
   double* forces = block + layout_.forces.offset;
   Position total{};
@@ -206,10 +214,11 @@ void ModelContinuation<Model>::record_shape() {
   }
 }
 
-#define CCR_INSTANTIATE(Model)                                             \
-  template Optimality ModelContinuation<Model>::optimality(const double*); \
-  template void ModelContinuation<Model>::read_block(const double*);       \
-  template void ModelContinuation<Model>::write_block(double*);            \
+#define CCR_INSTANTIATE(Model)                                                \
+  template Optimality ModelContinuation<Model>::optimality(const double*);    \
+  template void ModelContinuation<Model>::read_block(const double*);          \
+  template void ModelContinuation<Model>::write_block(double*);               \
+  template void ModelContinuation<Model>::tip_slopes(const double*, double*); \
   template void ModelContinuation<Model>::record_shape();
 CCR_EACH_MODEL(CCR_INSTANTIATE)
 #undef CCR_INSTANTIATE

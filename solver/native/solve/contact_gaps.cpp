@@ -94,7 +94,7 @@ void ContactProblem<Model>::measure_gaps() {
         place_node<Model>(robot_, nodes_[i], frames()[i], &points_[i]);
       for (int start = i * stride; start < points; start += positions)
         for (int k = start; k < start + (i < n ? stride : 1); ++k)
-          if (obstacle.touchable[k]) near_.push_back(first + k);
+          if (obstacle.can_touch(k)) near_.push_back(first + k);
     }
     ccr::measure_gaps(obstacle, std::span<const Position>(points_), moved, std::span(near_).subspan(others), first,
                       gaps_.data());

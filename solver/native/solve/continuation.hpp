@@ -87,6 +87,9 @@ class Continuation {
   // multipliers.
   virtual Optimality optimality(const double* block) = 0;
 
+  // Writes the slopes of the free tip at a command, those that stand in a block.
+  virtual void tip_slopes(const double* command, double* to) = 0;
+
   // Numbers of a row of `slopes`, and of these rows.
   virtual int slope_row() const = 0;
   virtual int parameters() const = 0;

@@ -216,10 +216,8 @@ bool ModelContinuation<Model>::advance(Pursuit& pursuit, const Command& goal, do
     }
     stalled = end == End::kOverTension;
     if (problem_.keeps_tensions()) pursuit.reached = std::max(pursuit.reached, Status::kStalled);
-    if (end == End::kSnapped) {
-      pursuit.snapped = true;
-      pursuit.reached = std::max(pursuit.reached, Status::kSnapped);
-    }
+    pursuit.snapped = pursuit.snapped || end == End::kSnapped;
+    if (end == End::kSnapped) pursuit.reached = std::max(pursuit.reached, Status::kSnapped);
     step = 2 * (pursuit.finest < kSmallestStep ? size : kSmallestStep);
     pursuit.refined = false;
   }

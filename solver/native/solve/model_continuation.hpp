@@ -55,6 +55,7 @@ class ModelContinuation : public Continuation<Model::kSpace> {
   StepResult trace(const double* from, const double* target, double* to, std::vector<double>& shapes) override;
   bool ramp_reaches_force(const Ramp& ramp, double* reached) override;
   Optimality optimality(const double* block) override;
+  void tip_slopes(const double* command, double* to) override;
   int slope_row() const override;
   int parameters() const override;
   SlopeResult slopes(const double* block, const bool* held, bool in_obstacles, double* to) override;

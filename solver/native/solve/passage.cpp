@@ -70,9 +70,9 @@ bool ModelContinuation<Model>::passage_is_clear(int j, double moved) const {
       } else {
         close = true;
       }
-      if (!obstacle.touchable[k]) continue;
+      if (!obstacle.can_touch(k)) continue;
       if (close && norm(minus(to(k), from(k))) > path && !path_clear(obstacle, from(k), to(k))) return false;
-      if (!edges || k == first || !obstacle.touchable[k - 1] || !(close || was_close)) continue;
+      if (!edges || k == first || !obstacle.can_touch(k - 1) || !(close || was_close)) continue;
       if (!edge_clear<kSpace>(obstacle, {from(k - 1), from(k)}, {to(k - 1), to(k)}, longest / 2)) return false;
     }
   }
